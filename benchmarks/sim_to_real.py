@@ -26,9 +26,8 @@ from pretouch.sim.randomisation import drawn, world_set
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import Obstacles, RobotState
 from pretouch_lab.identification.arm_file import arm_toml
-from pretouch_lab.identification.free_motion import read_free_motion
 from pretouch_lab.identification.identify import identify
-from pretouch_lab.identification.samples import ArmSamples
+from pretouch_lab.identification.recording import ArmSamples, read_free_motion
 from pretouch_lab.replay import DetectorAlone
 from pretouch_lab.trial import Setup, play
 
@@ -55,26 +54,26 @@ def recorded(plant: PlantParams, seed: int, seconds: float, place: Path) -> tupl
 
 def deviations(found, plant: Plant) -> dict[str, list[float]]:
     """How many standard errors each number is off the truth, of those that the recording tells."""
-    p, fitted = plant.params, found.fit
-    own, errors = fitted.of_joints(fitted.numbers), fitted.of_joints(fitted.errors)
-    told = fitted.of_joints(found.known().astype(float)) > 0.5
-    ripple, ripple_error, _ = found.ripple()
+    p, fitted, noise, always = plant.params, found.fit, found.noise, np.array([True])
+    truths = {
+        "offsets_nm": plant.offset_nm,
+        "friction_f1_nm": (1 - p.friction_compensated) * np.array(p.friction_f1_nm),
+        "friction_f2_s_rad": np.array(p.friction_f2_s_rad),
+        "friction_f3_rad_s": np.array(p.friction_f3_rad_s),
+        "ripple_nm": np.array(p.ripple_nm),
+        "torque_noise_nm": np.array(p.torque_noise_nm),
+    }
     truth = {
-        "offset": (own[:, 0], errors[:, 0], plant.offset_nm, told[:, 0]),
-        "friction F1": (own[:, 1], errors[:, 1], (1 - p.friction_compensated) * np.array(p.friction_f1_nm), told[:, 1]),
-        "friction ln F2": (own[:, 2], errors[:, 2], np.log(p.friction_f2_s_rad), told[:, 2]),
-        "friction F3": (own[:, 3], errors[:, 3], np.array(p.friction_f3_rad_s), told[:, 3]),
-        "ripple": (ripple, ripple_error, np.array(p.ripple_nm), ripple > 3 * ripple_error),
-        "torque noise": (found.noise.torque_nm, found.noise.torque_errors_nm, np.array(p.torque_noise_nm), told[:, 0]),
-        "payload": (fitted.numbers[-2:-1], fitted.errors[-2:-1], np.array([plant.error.payload]), np.array([True])),
-        "observer gain": (
-            np.array([fitted.gain]), fitted.errors[-1:], np.array([p.observer_gain_1_s]), np.array([True])
-        ),
-        "velocity noise": (
-            np.array([found.noise.velocity_rad_s]), np.array([found.noise.velocity_error_rad_s]),
-            np.array([p.velocity_noise_rad_s]), np.array([True]),
-        ),
-    }  # fmt: skip
+        row.name: (row.values, row.standard_errors, truths[row.field], row.identified)
+        for row in found.of_joints()
+        if row.field in truths
+    }
+    numbers = {
+        "payload [kg]": (*fitted.payload, plant.error.payload),
+        "observer gain [1/s]": (fitted.gain, fitted.errors[-1], p.observer_gain_1_s),
+        "velocity noise [rad/s]": (noise.velocity_rad_s, noise.velocity_error_rad_s, p.velocity_noise_rad_s),
+    }
+    truth |= {name: (*(np.array([each]) for each in three), always) for name, three in numbers.items()}
     return {
         name: [[(v - t) / e, v - t, t] for v, e, t, ok in zip(*values, strict=True) if ok]
         for name, values in truth.items()
@@ -159,7 +158,7 @@ def coverage(rows: list[dict[str, object]]) -> None:
         inside, off = int((np.abs(all_of[:, 0]) < 1.96).sum()), np.median(np.abs(all_of[:, 1]))
         spread = np.sqrt(np.mean(all_of[:, 0] ** 2))
         print(
-            f"{name:16} {inside}/{len(all_of)} within 1.96 standard errors, rms {spread:.2f} of them, off by {off:.3g}"
+            f"{name:34} {inside}/{len(all_of)} within 1.96 standard errors, rms {spread:.2f} of them, off by {off:.3g}"
         )
 
 

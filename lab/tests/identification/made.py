@@ -8,8 +8,8 @@ from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sim.observer import observe, observer_init
 from pretouch.sim.plant_params import PlantParams
-from pretouch_lab.identification.identify import Identified
-from pretouch_lab.identification.samples import ArmSamples
+from pretouch_lab.identification.identify import Identified, Quantity
+from pretouch_lab.identification.recording import ArmSamples
 
 MODEL = RobotModel(panda())
 PLANT = PlantParams()
@@ -62,6 +62,11 @@ def free_motion(made: Made = Made(), seconds: float = 60.0, seed: int = 5, every
         if i % every == every - 1:
             rows.append((t[i, 0], q[i], measured[i], state.residual))
     return ArmSamples(*(np.array(column) for column in zip(*rows, strict=True)))
+
+
+def row(found: Identified, field: str) -> Quantity:
+    """What was identified of a field of the joints."""
+    return next(each for each in found.of_joints() if each.field == field)
 
 
 def sigmas_off(found: Identified, column: int, truth: np.ndarray) -> float:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lab.tests.identification.made import FRICTION, MODEL, USUAL, Made, free_motion, sigmas_off
+from lab.tests.identification.made import FRICTION, MODEL, USUAL, Made, free_motion, row, sigmas_off
 
 from pretouch.errors import CalibrationError
 from pretouch_lab.identification.arm_file import arm_toml
@@ -69,7 +69,7 @@ def test_an_arm_comes_out_of_a_rough_recording(fast, rough):
     assert sigmas_off(found, 0, MADE.offset) < 4.0
     assert np.abs(found.fit.of_joints(found.fit.numbers)[:, 0] - MADE.offset).max() < 0.06
     assert sigmas_off(found, 1, FRICTION) < 4.0
-    assert found.ripple()[0] == pytest.approx(MADE.ripple, abs=0.025)
+    assert row(found, "ripple_nm").values == pytest.approx(MADE.ripple, abs=0.025)
     assert abs(found.fit.numbers[-2] - MADE.payload) < 4.0 * found.fit.errors[-2]
     assert found.fit.gain == pytest.approx(MADE.gain, rel=0.01)
     assert found.noise.velocity_rad_s == pytest.approx(MADE.velocity_noise, rel=0.02)

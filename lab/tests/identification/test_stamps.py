@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pretouch_lab.identification.motion import moved
-from pretouch_lab.identification.samples import ArmSamples, usable
+from pretouch_lab.identification.recording import ArmSamples, usable
 
 RATES = np.array([0.7, 0.9, 1.1, 1.3])
 
@@ -69,7 +69,7 @@ def test_a_short_gap_is_bridged_and_a_long_one_parts(missing, segments):
     given = at(TIME)
     left = np.delete(np.arange(len(TIME)), np.arange(2000, 2000 + missing))
     found = usable(given.at(left))
-    assert len(found.segments) == segments
+    assert len(found.stretches) == segments
     (motion, *_), path = moved(found)[1], 0.5 * RATES * np.cos(RATES * 20.04)
     assert segments == 2 or motion.between()(20.04, 1) == pytest.approx(path, abs=1e-4)
 

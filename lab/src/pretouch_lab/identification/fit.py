@@ -16,6 +16,7 @@ blocks of 1 s, so that they may be correlated within a block, and the priors sta
 
 import numpy as np
 from scipy.signal import lfilter
+from scipy.special import expit
 
 from pretouch.contact.residual_model import PLAIN, features_into, features_of
 from pretouch.robot.model import RobotModel
@@ -24,7 +25,7 @@ from pretouch.traces import on_grid
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
 from pretouch_lab.identification.motion import GRID_S, Motion
-from pretouch_lab.identification.samples import Usable, joint_scale
+from pretouch_lab.identification.recording import Usable, joint_scale
 
 _FINE_S = 0.001
 """Spacing at which friction and ripple are low-passed [s]."""
@@ -51,18 +52,16 @@ _REACH = 1.0
 
 @value
 class Columns:
-    """Of N samples of an arm with n joints; F instants lie 1 ms apart, G as those of the motion."""
+    """What does not depend on the numbers: N samples of n joints; F instants lie 1 ms apart, G as those of a motion."""
 
-    motion: tuple[Motion, ...]
-    """Of each segment."""
-    fine: tuple[FloatArray, ...]
-    """Instants (F,) of each segment [s]."""
-    q: tuple[FloatArray, ...]
-    """(F, n) joint positions there [rad]."""
-    speed: tuple[FloatArray, ...]
+    motion: list[Motion]
+    """Of each stretch."""
+    q: list[FloatArray]
+    """(F, n) joint positions in each stretch [rad]."""
+    speed: list[FloatArray]
     """(F, n) joint velocities there [rad/s]: derivatives of the positions."""
-    carried: tuple[FloatArray, ...]
-    """(G, n, n + 1) of each segment: torque of each joint by weight and inertia of the links behind each joint and of
+    carried: list[FloatArray]
+    """(G, n, n + 1) of each stretch: torque of each joint by weight and inertia of the links behind each joint and of
     1 kg at the end-effector [Nm], before the low-pass."""
     kick: FloatArray
     """(N, n) noise of the measured velocities, as likely as it is, times the mass matrix [kg m^2 rad/s]; 0 without
@@ -77,15 +76,13 @@ class Columns:
 
 def columns_of(found: Usable, motions: list[Motion], model: RobotModel) -> Columns:
     """Work out all that does not depend on what is to be found."""
-    s = found.samples
-    spans = [slice(a, b) for a, b in found.segments]
+    s, n = found.samples, model.n
     kick, noise, calm = np.zeros(s.q.shape), np.zeros(s.q.shape), np.zeros(len(s.stamp), np.bool_)
-    fine, positions, speeds, carried, masses = [], [], [], [], []
-    for span, motion in zip(spans, motions, strict=True):
+    positions, speeds, carried, masses = [], [], [], []
+    for span, motion in zip(found.stretches, motions, strict=True):
         time, path = s.stamp[span], motion.between()
-        M = np.array([model.mass_matrix(q) for q in motion.q])
-        masses.append(M)
-        x = np.empty((len(motion.q), model.n, features_of(model.n)))
+        masses.append(np.array([model.mass_matrix(q) for q in motion.q]))
+        x = np.empty((len(motion.q), n, features_of(n)))
         for i, (q, qd, qdd) in enumerate(zip(motion.q, motion.qd, motion.qdd, strict=True)):
             features_into(model.kinematics(q), model.mechanism, qd, qdd, x[i])
         carried.append(x[:, :, PLAIN:])
@@ -93,23 +90,20 @@ def columns_of(found: Usable, motions: list[Motion], model: RobotModel) -> Colum
         if s.qd is not None:
             growth = on_grid(time, motion.at[0], GRID_S, motion.qdd)
             noise[span] = _noise(s.qd[span], path(time, 1), growth, calm[span])
-        at = np.arange(time[0], time[-1] + 0.5 * _FINE_S, _FINE_S)
-        fine.append(at)
-        positions.append(path(at))
-        speeds.append(path(at, 1))
+        fine = np.arange(time[0], time[-1] + 0.5 * _FINE_S, _FINE_S)
+        positions.append(path(fine))
+        speeds.append(path(fine, 1))
     if s.qd is not None and calm.any():
         # part of what differs is the derivatives' own noise: on average this share is the velocities'
         share = np.maximum(1.0 - (motions[0].speed_noise / joint_scale(noise[calm])) ** 2, 0.0)
-        for span, motion, M in zip(spans, motions, masses, strict=True):
+        for span, motion, M in zip(found.stretches, motions, masses, strict=True):
             kick[span] = np.einsum("tij,tj->ti", on_grid(s.stamp[span], motion.at[0], GRID_S, M), share * noise[span])
     square = (np.concatenate(masses) ** 2).mean(axis=0)
-    return Columns(
-        tuple(motions), tuple(fine), tuple(positions), tuple(speeds), tuple(carried), kick, noise, square, calm
-    )  # fmt: skip
+    return Columns(motions, positions, speeds, carried, kick, noise, square, calm)
 
 
 def _calm(motion: Motion, time: FloatArray) -> BoolArray:
-    """Say which samples (N,) of a segment are calm, and not among its first: there the low-pass still begins."""
+    """Say which samples (N,) of a stretch are calm, and not among its first: there the low-pass still begins."""
     quick = motion.quick.copy()
     quick[: round(_REMEMBERED_S / GRID_S)] = True
     before, after = round(motion.half_s / GRID_S), round(_REMEMBERED_S / GRID_S)
@@ -123,37 +117,34 @@ def _noise(measured: FloatArray, speed: FloatArray, growth: FloatArray, calm: Bo
     A velocity that is measured late, or at the end of a control period of constant set-point, is off by so much of the
     acceleration: that is no noise.
     """
-    off = measured - speed
-    noise = np.zeros_like(off)
-    if not calm.any():
-        return noise
-    for j in range(off.shape[1]):
-        known = np.column_stack([np.ones(len(off)), speed[:, j], growth[:, j]])
-        noise[:, j] = off[:, j] - known @ np.linalg.lstsq(known[calm], off[calm, j], rcond=None)[0]
+    noise = np.zeros_like(speed)
+    for j in range(speed.shape[1] if calm.any() else 0):
+        explained = np.column_stack([np.ones(len(speed)), speed[:, j], growth[:, j]])
+        off = measured[:, j] - speed[:, j]
+        noise[:, j] = off - explained @ np.linalg.lstsq(explained[calm], off[calm], rcond=None)[0]
     return noise
 
 
-def low_passed(found: Usable, columns: Columns, gain: float, fine_values: list[FloatArray]) -> FloatArray:
-    """Low-pass values (F, ...) of each segment as the observer does, and return them at the samples (N, ...)."""
+def _late(found: Usable, values: list[FloatArray], spacing: float, ahead: list[float], pole: float) -> FloatArray:
+    """Filter values (F, ...) of each stretch, so far apart [s], with one pole; return them at the samples (N, ...)."""
+    rows = []
+    for span, each in zip(found.stretches, values, strict=True):
+        time = found.samples.stamp[span]
+        smooth, _ = lfilter(ahead, [1.0, -pole], each, axis=0, zi=(1.0 - ahead[0]) * each[:1])
+        rows.append(on_grid(time, time[0], spacing, smooth))
+    return np.concatenate(rows)
+
+
+def low_passed(found: Usable, fine_values: list[FloatArray], gain: float) -> FloatArray:
+    """Low-pass values (F, ...) of each stretch as the observer does, and return them at the samples (N, ...)."""
     part = gain * _FINE_S / (1.0 + gain * _FINE_S)
-    s = found.samples
-    result = np.zeros((len(s.stamp), *fine_values[0].shape[1:]))
-    for (a, b), at, values in zip(found.segments, columns.fine, fine_values, strict=True):
-        start = ((1.0 - part) * values[0])[None]
-        smooth, _ = lfilter([part], [1.0, part - 1.0], values, axis=0, zi=start)
-        result[a:b] = on_grid(s.stamp[a:b], at[0], _FINE_S, smooth)
-    return result
+    return _late(found, fine_values, _FINE_S, [part], 1.0 - part)
 
 
 def carried_late(found: Usable, columns: Columns, gain: float) -> FloatArray:
     """Return `carried` at the samples (N, n, n + 1) after the low-pass, by the trapezoidal rule: it changes slowly."""
-    s, half = found.samples, 0.5 * gain * GRID_S
-    late = np.zeros((*s.q.shape, s.q.shape[1] + 1))
-    part, kept = half / (1.0 + half), (1.0 - half) / (1.0 + half)
-    for (a, b), motion, values in zip(found.segments, columns.motion, columns.carried, strict=True):
-        smooth, _ = lfilter([part, part], [1.0, -kept], values, axis=0, zi=((1.0 - part) * values[0])[None])
-        late[a:b] = on_grid(s.stamp[a:b], motion.at[0], GRID_S, smooth)
-    return late
+    half = 0.5 * gain * GRID_S
+    return _late(found, columns.carried, GRID_S, 2 * [half / (1.0 + half)], (1.0 - half) / (1.0 + half))
 
 
 def friction_parts(speed: FloatArray, steepness: FloatArray, asymmetry: FloatArray) -> tuple[FloatArray, ...]:
@@ -161,14 +152,10 @@ def friction_parts(speed: FloatArray, steepness: FloatArray, asymmetry: FloatArr
 
     sigma(F2 (qd + F3)) - sigma(F2 F3), the form of Gaz et al. 2019 with sigma the logistic function.
     """
-    arm, rest = _logistic(steepness * (speed + asymmetry)), _logistic(steepness * asymmetry)
+    arm, rest = expit(steepness * (speed + asymmetry)), expit(steepness * asymmetry)
     slope, slope_rest = arm * (1.0 - arm), rest * (1.0 - rest)
     by_steepness = steepness * ((speed + asymmetry) * slope - asymmetry * slope_rest)
     return arm - rest, by_steepness, steepness * (slope - slope_rest)
-
-
-def _logistic(x: FloatArray) -> FloatArray:
-    return np.asarray(0.5 * (1.0 + np.tanh(0.5 * x)))
 
 
 @value
@@ -187,8 +174,11 @@ class Fit:
     """(N, n) what is explained [Nm], the velocities' noise not in it."""
     kicked: FloatArray
     """(N, n) what the velocities' noise explains [Nm]."""
-    scale: FloatArray
-    """(n,) robust standard deviation of what is left [Nm]."""
+
+    @property
+    def payload(self) -> tuple[float, float]:
+        """The payload and its standard error [kg]."""
+        return float(self.numbers[-2]), float(self.errors[-2])
 
     def of_joints(self, which: FloatArray) -> FloatArray:
         """Return numbers or errors (p,) of the joints as (n, 6)."""
@@ -196,12 +186,9 @@ class Fit:
         return which[: OWN * n].reshape(n, OWN)
 
 
-def fit(
-    found: Usable, columns: Columns, used: BoolArray, usual: PlantParams, cycles: FloatArray,
-    payload: bool = True,
-) -> Fit:  # fmt: skip
+def fit(found: Usable, columns: Columns, used: BoolArray, usual: PlantParams, payload: bool = True) -> Fit:
     """Find all parts from the samples that are used (N,); without `payload` that stays 0."""
-    n = found.samples.q.shape[1]
+    n, cycles = found.samples.q.shape[1], np.array(usual.ripple_cycles)
     start, priors = _begin(n, usual, payload)
     theta, gain = start.copy(), usual.observer_gain_1_s
     kicks = bool(columns.kick.any())
@@ -231,10 +218,8 @@ def fit(
             break
     X, expected = design(found, columns, carried, theta, gain, cycles)
     kicked = theta[-1] * columns.kick
-    score = (found.samples.tau - expected - kicked) * weight
-    covariance = _sandwich(H, precision, _block_scores(found, X, score))
-    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return Fit(theta, errors, priors, gain, expected, kicked, scale)
+    score = np.einsum("ijp,ij->ip", X, (found.samples.tau - expected - kicked) * weight)
+    return Fit(theta, _standard_errors(found, H, precision, score), priors, gain, expected, kicked)
 
 
 def _begin(n: int, usual: PlantParams, payload: bool) -> tuple[FloatArray, FloatArray]:
@@ -242,9 +227,7 @@ def _begin(n: int, usual: PlantParams, payload: bool) -> tuple[FloatArray, Float
     own, spread = np.zeros((n, OWN)), np.zeros((n, OWN))
     own[:, 1] = (1.0 - usual.friction_compensated) * np.array(usual.friction_f1_nm)
     own[:, 2], own[:, 3] = np.log(usual.friction_f2_s_rad), np.array(usual.friction_f3_rad_s)
-    spread[:] = (
-        _OFFSET_NM, _FRICTION_NM, _STEEPNESS, _ASYMMETRY_RAD_S, _RIPPLE_NM, _RIPPLE_NM,
-    )  # fmt: skip
+    spread[:] = _OFFSET_NM, _FRICTION_NM, _STEEPNESS, _ASYMMETRY_RAD_S, _RIPPLE_NM, _RIPPLE_NM
     shared = np.array([_MASS] * n + [_PAYLOAD_KG if payload else 1e-6, 1e4])
     start = np.concatenate([own.ravel(), np.zeros(n + 1), [usual.observer_gain_1_s]])
     return start, np.concatenate([spread.ravel(), shared])
@@ -260,38 +243,28 @@ def design(
     for q, speed in zip(columns.q, columns.speed, strict=True):
         friction = friction_parts(speed, np.exp(own[:, 2]), own[:, 3])
         shapes.append(np.stack([*friction, np.sin(cycles * q), np.cos(cycles * q)], axis=1))
-    late = low_passed(found, columns, gain, shapes)
+    late = low_passed(found, shapes, gain)
+    late[:, 1:3] *= own[:, 1]  # derivatives by what the friction's F1 multiplies
     X = np.zeros((count, n, len(theta)))
     for j in range(n):
-        at = OWN * j
-        X[:, j, at] = -1.0
-        X[:, j, at + 1] = -late[:, 0, j]
-        X[:, j, at + 2] = -own[j, 1] * late[:, 1, j]
-        X[:, j, at + 3] = -own[j, 1] * late[:, 2, j]
-        X[:, j, at + 4], X[:, j, at + 5] = -late[:, 3, j], -late[:, 4, j]
+        X[:, j, OWN * j] = -1.0
+        X[:, j, OWN * j + 1 : OWN * (j + 1)] = -late[:, :, j]
     X[:, :, OWN * n : -1] = carried
     X[:, :, -1] = columns.kick
     linear = theta.copy()
     linear[-1] = 0.0
-    own_linear = linear[: OWN * n].reshape(n, OWN)
-    own_linear[:, 2:4] = 0.0
+    linear[: OWN * n].reshape(n, OWN)[:, 2:4] = 0.0
     return X, X @ linear
 
 
-def _block_scores(found: Usable, X: FloatArray, score: FloatArray) -> FloatArray:
-    """Scores (B, p) of blocks."""
+def _standard_errors(found: Usable, H: FloatArray, precision: FloatArray, score: FloatArray) -> FloatArray:
+    """Errors (p,) by the scores (N, p) of the samples, with the usual correction for the number of blocks."""
     time = found.samples.stamp
     block = ((time - time[0]) / BLOCK_S).astype(np.int64)
-    each = np.einsum("ijp,ij->ip", X, score)
-    total = np.zeros((int(block.max()) + 1, X.shape[2]))
-    np.add.at(total, block, each)
-    return total[np.bincount(block, minlength=len(total)) > 0]
-
-
-def _sandwich(H: FloatArray, precision: FloatArray, scores: FloatArray) -> FloatArray:
-    """Covariance of the numbers, with the usual correction for the number of blocks."""
-    blocks = len(scores)
-    bread = np.linalg.inv(H)
+    scores = np.zeros((int(block.max()) + 1, score.shape[1]))
+    np.add.at(scores, block, score)
+    scores = scores[np.bincount(block, minlength=len(scores)) > 0]
     centred = scores - scores.mean(axis=0)
-    filling = centred.T @ centred * blocks / max(blocks - 1, 1) + precision
-    return np.asarray(bread @ filling @ bread)
+    filling = centred.T @ centred * len(scores) / max(len(scores) - 1, 1) + precision
+    bread = np.linalg.inv(H)
+    return np.asarray(np.sqrt(np.maximum(np.diag(bread @ filling @ bread), 0.0)))

@@ -1,4 +1,7 @@
-"""From samples of an arm in free motion to what kind of arm it is, with standard errors."""
+"""From samples of an arm in free motion to what kind of arm it is, with standard errors.
+
+What looks like a contact is no noise and is left out. The noise of the rest is of velocities and of torque sensors.
+"""
 
 import numpy as np
 
@@ -7,16 +10,50 @@ from pretouch.robot.model import RobotModel
 from pretouch.sim.plant_params import PlantParams
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
-from pretouch_lab.identification.fit import OWN, Fit, columns_of, fit
+from pretouch_lab.identification.fit import BLOCK_S, OWN, Columns, Fit, columns_of, fit
 from pretouch_lab.identification.motion import moved
-from pretouch_lab.identification.noise import Noise, free_samples, noise_of
-from pretouch_lab.identification.samples import LEAST_S, ArmSamples, usable
+from pretouch_lab.identification.recording import LEAST_S, ArmSamples, Usable, joint_scale, usable
 
 _ROUNDS = 3
-_KNOWN = 0.5
-"""A number is identified where its standard error is below this part of what was known before [1]."""
+_IDENTIFIED = 0.5
+"""A number is identified where its standard error is below this part of what was assumed before [1]."""
 _MOST_MASS_ERROR = 0.5
 """A link whose mass seems to be off by more than this, beyond doubt, is another arm's [1]."""
+_CONTACT_SIGMAS, _CONTACT_S = 6.0, 0.15
+"""A mean over so long [s], so many of its own robust deviations off, is taken for a contact."""
+_MARGIN_S = 0.5
+"""What is left out before and after a contact as well [s]."""
+_MOST_CONTACTS = 0.3
+"""Of a recording in which more than this part looks like contacts nothing is identified."""
+_LEAST_BLOCKS = 8
+_LEAST_VELOCITY_RAD_S = 1e-5
+"""Least noise of measured velocities that is reported [rad/s]."""
+
+
+@value
+class Noise:
+    """Standard deviations of the noise of n joints, with their standard errors."""
+
+    torque_nm: FloatArray
+    """(n,) of the torque sensors, before the observer [Nm]."""
+    torque_errors_nm: FloatArray
+    velocity_rad_s: float
+    """Of the measured velocities [rad/s]; NaN without velocities."""
+    velocity_error_rad_s: float
+
+
+@value
+class Quantity:
+    """One number of each of n joints."""
+
+    name: str
+    """With its unit."""
+    field: str
+    """Of `PlantParams`; '' for a number that stands there otherwise."""
+    values: FloatArray
+    standard_errors: FloatArray
+    identified: BoolArray
+    """(n,) whether the recording tells it; else it stays near what is usual."""
 
 
 @value
@@ -25,14 +62,8 @@ class Identified:
 
     fit: Fit
     noise: Noise
-    time: FloatArray
-    """(N,) instants of the samples used or left out [s]."""
-    q: FloatArray
-    """(N, n) [rad]."""
-    tau: FloatArray
-    """(N, n) what was to be explained [Nm]."""
-    used: BoolArray
-    """(N,) samples taken for free motion."""
+    samples: ArmSamples
+    """Those used or left out."""
     spans: tuple[tuple[float, float], ...]
     """From when to when something looked like a contact [s]."""
     notes: tuple[str, ...]
@@ -41,15 +72,32 @@ class Identified:
     usual: PlantParams
     """The arm as it is taken to be without a recording."""
 
-    def known(self) -> BoolArray:
-        """Which of the fit's numbers (p,) the recording tells: the error is well below what was believed before."""
-        return np.asarray(self.fit.errors < _KNOWN * self.fit.priors)
+    @property
+    def has_velocities(self) -> bool:
+        """Whether the noise of velocities, that of torques and the observer's gain are identified."""
+        return self.noise.velocity_rad_s == self.noise.velocity_rad_s
 
-    def ripple(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Amplitudes (n,) [Nm], their standard errors, and phases [rad], as the plant has them."""
+    def of_joints(self) -> list[Quantity]:
+        """Return the numbers of the joints. The friction F1 is that which the interface does not compensate."""
         own, errors = self.fit.of_joints(self.fit.numbers), self.fit.of_joints(self.fit.errors)
-        amplitude = np.hypot(own[:, 4], own[:, 5])
-        return amplitude, np.hypot(errors[:, 4], errors[:, 5]) / np.sqrt(2.0), np.arctan2(own[:, 5], own[:, 4])
+        clear = self.fit.errors < _IDENTIFIED * self.fit.priors
+        of_own, steepness = clear[: own.size].reshape(own.shape), np.exp(own[:, 2])
+        ripple, ripple_error = np.hypot(own[:, 4], own[:, 5]), np.hypot(errors[:, 4], errors[:, 5]) / np.sqrt(2.0)
+        masses, noise = slice(own.size, own.size + len(own)), self.noise
+        phase, phase_error = np.arctan2(own[:, 5], own[:, 4]), ripple_error / np.maximum(ripple, 1e-9)
+        rows = [
+            ("offset [Nm]", "offsets_nm", own[:, 0], errors[:, 0], of_own[:, 0]),
+            ("friction F1, not compensated [Nm]", "friction_f1_nm", own[:, 1], errors[:, 1], of_own[:, 1]),
+            ("friction F2 [s/rad]", "friction_f2_s_rad", steepness, steepness * errors[:, 2], of_own[:, 2]),
+            ("friction F3 [rad/s]", "friction_f3_rad_s", own[:, 3], errors[:, 3], of_own[:, 3]),
+            ("ripple [Nm]", "ripple_nm", ripple, ripple_error, of_own[:, 4] & (ripple > 3.0 * ripple_error)),
+            ("phase of the ripple [rad]", "ripple_phases_rad", phase, phase_error, np.ones(len(own), np.bool_)),
+            ("mass error of its links", "", self.fit.numbers[masses], self.fit.errors[masses], clear[masses]),
+        ]
+        if self.has_velocities:  # else the velocities' noise is in what is left of the torques
+            torque = noise.torque_nm
+            rows.append(("torque noise [Nm]", "torque_noise_nm", torque, noise.torque_errors_nm, torque > 0.0))
+        return [Quantity(*row) for row in rows]
 
 
 def identify(samples: ArmSamples, model: RobotModel, usual: PlantParams) -> Identified:
@@ -60,34 +108,38 @@ def identify(samples: ArmSamples, model: RobotModel, usual: PlantParams) -> Iden
             f" {model.description.name} has {model.n} joints: give the arm it is of."
         )
     found, motions = moved(usable(samples))
-    columns = columns_of(found, motions, model)
-    cycles = np.array(usual.ripple_cycles)
-    settled = used = columns.calm
-    spans: tuple[tuple[float, float], ...] = ()
-    if float(settled.sum()) * found.period < LEAST_S:
+    columns, notes = columns_of(found, motions, model), [*found.notes]
+    used = columns.calm
+    even_s = float(used.sum()) * found.period
+    if even_s < LEAST_S:
         raise CalibrationError(
-            f"The arm's speed changes so often that {float(settled.sum()) * found.period:.1f} s of even motion are"
-            f" left: record {LEAST_S:g} s or more along smooth paths, or slower."
+            f"The arm's speed changes so often that {even_s:.1f} s of even motion are left: record {LEAST_S:g} s or"
+            " more along smooth paths, or slower."
         )
     for _ in range(_ROUNDS):
-        fitted = fit(found, columns, used, usual, cycles)
+        fitted = fit(found, columns, used, usual)
         free, spans = free_samples(found, fitted)
-        again = settled & free
+        again = columns.calm & free
         if np.array_equal(again, used):
             break
         used = again
-    notes = [*found.notes]
-    payload = OWN * model.n + model.n
-    if fitted.numbers[payload] < 0.0:
-        fitted = fit(found, columns, used, usual, cycles, payload=False)
-        notes.append("The payload comes out below zero: it is kept at 0, and the masses of the links take the rest.")
+    if fitted.payload[0] < 0.0:
+        fitted = fit(found, columns, used, usual, payload=False)
+        notes.append("The payload comes out below zero: it is 0, and the masses of the links take the rest.")
     seconds = float(used.sum()) * found.period
     if seconds < LEAST_S:
         raise CalibrationError(
             f"Only {seconds:.1f} s of free motion are left without what looks like contacts: record {LEAST_S:g} s or"
             " more."
         )
-    _check_arm(fitted, model)
+    masses = slice(OWN * model.n, OWN * model.n + model.n)
+    far = np.flatnonzero(np.abs(fitted.numbers[masses]) - 3.0 * fitted.errors[masses] > _MOST_MASS_ERROR)
+    if len(far):
+        raise CalibrationError(
+            f"The links behind {model.joints[far[0]]} would have masses off by"
+            f" {100 * fitted.numbers[masses][far[0]]:.0f} %: the recording is of another arm than"
+            f" {model.description.name}, its torques have the other sign (--sign), or gravity is still in them."
+        )
     if spans:
         first = found.samples.stamp[0]
         listed = ", ".join(f"{a - first:.1f} to {b - first:.1f}" for a, b in spans[:8])
@@ -96,19 +148,88 @@ def identify(samples: ArmSamples, model: RobotModel, usual: PlantParams) -> Iden
             f"{' and more' if len(spans) > 8 else ''}."
         )
     noise = noise_of(found, columns, fitted, used, usual)
-    s = found.samples
-    return Identified(
-        fitted, noise, s.stamp, s.q, s.tau, used, spans, tuple(notes), seconds, usual
-    )  # fmt: skip
+    return Identified(fitted, noise, found.samples, spans, tuple(notes), seconds, usual)
 
 
-def _check_arm(fitted: Fit, model: RobotModel) -> None:
-    n = model.n
-    mass, error = fitted.numbers[OWN * n : OWN * n + n], fitted.errors[OWN * n : OWN * n + n]
-    far = np.flatnonzero(np.abs(mass) - 3.0 * error > _MOST_MASS_ERROR)
-    if len(far):
+def free_samples(found: Usable, fitted: Fit) -> tuple[BoolArray, tuple[tuple[float, float], ...]]:
+    """Say which samples (N,) are of free motion, and from when to when [s] something else is.
+
+    What a contact does lasts longer than noise: means over `_CONTACT_S` are compared with how far such means usually
+    are off. CalibrationError if too much looks like that.
+    """
+    stamp, left = found.samples.stamp, found.samples.tau - fitted.expected
+    length = max(round(_CONTACT_S / found.period), 1)
+    means = np.zeros_like(left)
+    for span in found.stretches:
+        count = span.stop - span.start
+        total = np.cumsum(np.vstack([np.zeros((1, left.shape[1])), left[span]]), axis=0)
+        ends = np.minimum(np.arange(count) + length // 2 + 1, count)
+        begins = np.maximum(np.arange(count) - (length - 1) // 2 - (1 - length % 2), 0)
+        means[span] = (total[ends] - total[begins]) / (ends - begins)[:, None]
+    far = np.any(np.abs(means - np.median(means, axis=0)) > _CONTACT_SIGMAS * joint_scale(means), axis=1)
+    used, spans = np.ones(len(stamp), np.bool_), []
+    for span in found.stretches:
+        times = stamp[span][far[span]]
+        for group in np.split(times, np.flatnonzero(np.diff(times) > 2.0 * _MARGIN_S) + 1):
+            if len(group):
+                begin, end = float(group[0]) - _MARGIN_S, float(group[-1]) + _MARGIN_S
+                spans.append((begin, end))
+                used &= (stamp < begin) | (stamp > end)
+    share = 1.0 - float(used.mean())
+    if share > _MOST_CONTACTS:
         raise CalibrationError(
-            f"The links behind {model.joints[far[0]]} would have masses off by {100 * mass[far[0]]:.0f} %: the"
-            f" recording is of another arm than {model.description.name}, its torques have the other sign (--sign), or"
-            " gravity is still in them."
+            f"{100 * share:.0f} % of the recording looks like contacts: nothing may touch the arm while it is"
+            " identified. Record free motion, or cut the contacts out."
         )
+    return used, tuple(spans)
+
+
+def noise_of(found: Usable, columns: Columns, fitted: Fit, used: BoolArray, usual: PlantParams) -> Noise:
+    """Take the noise of the samples that are used (N,) apart."""
+    left = found.samples.tau - fitted.expected - fitted.kicked
+    # what is five deviations off is cut: one outlier would be most of a variance
+    bound = 5.0 * joint_scale(left[used])
+    square = np.clip(left - np.median(left[used], axis=0), -bound, bound) ** 2
+    length = round(BLOCK_S / found.period)
+    begins = [begin for span in found.stretches for begin in range(span.start, span.stop - length, length)]
+    blocks = np.array(
+        [square[begin : begin + length].mean(axis=0) for begin in begins if used[begin : begin + length].all()]
+    )
+    if len(blocks) < _LEAST_BLOCKS:
+        raise CalibrationError(
+            f"There are {len(blocks)} stretches of {BLOCK_S:g} s without a break: the noise needs {_LEAST_BLOCKS}."
+            " Record longer, along smoother paths, with nothing touching the arm."
+        )
+    noise, velocity = columns.velocity_noise[used], np.nan
+    if found.samples.qd is not None:  # the derivatives' noise is in what differs, too
+        excess = float(np.mean(joint_scale(noise) ** 2 - columns.motion[0].speed_noise ** 2))
+        velocity = float(np.sqrt(max(excess, _LEAST_VELOCITY_RAD_S**2)))
+    variance = blocks.mean(axis=0)
+    without = (len(blocks) * variance - blocks) / (len(blocks) - 1)  # each with one block left out: the jackknife
+    torque = _torque_noise(variance, velocity, columns, fitted, usual)
+    again = np.array([_torque_noise(sample, velocity, columns, fitted, usual) for sample in without])
+    errors = np.sqrt(len(again) - 1.0) * again.std(axis=0)
+    return Noise(torque, errors, velocity, 1.17 * velocity / np.sqrt(2.0 * noise.size))
+
+
+def _torque_noise(
+    variance: FloatArray, velocity: float, columns: Columns, fitted: Fit, usual: PlantParams
+) -> FloatArray:
+    """Standard deviation (n,) [Nm] of the torque sensors' noise that leaves such a variance behind the observer.
+
+    A first-order noise of corner a through the discrete low-pass of the observer, alpha = K dt / (1 + K dt), keeps the
+    part alpha / (2 - alpha) (1 + rho (1 - alpha)) / (1 - rho (1 - alpha)) of its variance, rho = exp(-a dt). What
+    earlier noise of the velocities left in the integral is taken off: K'^2 (M M^T)_jj alpha / (2 - alpha) of it; and
+    so is what the noise of the positions' derivatives, which is in what was taken for noise of the velocities, leaves.
+    """
+    dt, gain = usual.period_s, fitted.gain
+    alpha, rho = gain * dt / (1.0 + gain * dt), np.exp(-2.0 * np.pi * usual.torque_noise_hz * dt)
+    late = rho * (1.0 - alpha)
+    part = alpha / (2.0 - alpha) * (1.0 + late) / (1.0 - late)
+    own = np.zeros(len(variance))
+    if not np.isnan(velocity):
+        unknown = columns.motion[0].speed_noise ** 2
+        unknown = unknown * velocity**2 / (unknown + velocity**2)
+        shares = velocity**2 * alpha / (2.0 - alpha) + unknown
+        own = (alpha / dt) ** 2 * columns.mass_square @ shares
+    return np.sqrt(np.maximum(variance - own, 0.0) / part)

@@ -5,11 +5,9 @@ regression; Savitzky and Golay's filter where samples are evenly spaced). Lost s
 it less sure: each estimate is a weighted sum of samples, so its noise follows from theirs. How wide the fit is follows
 from the noise: as narrow as that allows, for a wide one rounds a path's corners.
 
-Stamps that are off, as those of a busy receiver, recovered from the joints together.
-
-An error of a stamp moves all joints of a sample along their speeds, as no noise of encoders does. So where the
-positions are too noisy for a narrow fit, stamps are moved to where the joints say that they were. Errors that last
-longer than the fit show in measured velocities: all joints seem faster or slower by the same part.
+An error of a stamp, as of a busy receiver, moves all joints of a sample along their speeds, as no noise of encoders
+does. So where the positions are too noisy for a narrow fit, stamps are moved to where the joints say that they were.
+Errors that last longer than the fit show in measured velocities: all joints seem faster or slower by the same part.
 """
 
 from dataclasses import replace
@@ -19,7 +17,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
-from pretouch_lab.identification.samples import Usable, joint_scale
+from pretouch_lab.identification.recording import Usable, joint_scale
 
 GRID_S = 0.01
 """Spacing of the instants at which the motion is estimated [s]."""
@@ -89,21 +87,13 @@ def motions_of(times: list[FloatArray], positions: list[FloatArray]) -> list[Mot
     narrow = [local_cubic(*each, 0.5 * half)[0][1] for each in given]
     differs = [speed - fitted[1] for speed, (fitted, _) in zip(narrow, fits, strict=True)]
     allowed = _ROUNDED_RAD_S + _SIGMAS * joint_scale(np.concatenate(differs))
-    quick = [
-        _quick(fitted[2], gains[:, 2, None] * noise) | np.any(np.abs(off) > allowed, axis=1)
-        for (fitted, gains), off in zip(fits, differs, strict=True)
-    ]
-    rows = zip(grids, fits, quick, strict=True)
-    return [
-        Motion(at, fitted[0], fitted[1], fitted[2], unsure, half, noise, gain[1] * noise)
-        for at, (fitted, _), unsure in rows
-    ]
-
-
-def _quick(qdd: FloatArray, noise: FloatArray) -> BoolArray:
-    """Say where (G,) accelerations (G, n) are beyond doubt too quick, or hardly known."""
-    beyond = np.abs(qdd) - 0.5 * _SIGMAS * noise > _QUICK_RAD_S2
-    return np.asarray(np.any(beyond | (noise > _QUICK_RAD_S2), axis=1))
+    motions = []
+    for at, (fitted, gains), off in zip(grids, fits, differs, strict=True):
+        unsure = gains[:, 2, None] * noise  # of the accelerations
+        quick = (np.abs(fitted[2]) - 0.5 * _SIGMAS * unsure > _QUICK_RAD_S2) | (unsure > _QUICK_RAD_S2)
+        quick = np.any(quick | (np.abs(off) > allowed), axis=1)
+        motions.append(Motion(at, fitted[0], fitted[1], fitted[2], quick, half, noise, gain[1] * noise))
+    return motions
 
 
 def position_noise(times: list[FloatArray], positions: list[FloatArray], half: float) -> FloatArray:
@@ -169,9 +159,9 @@ def _nearest(time: FloatArray, at: FloatArray) -> FloatArray:
 
 
 def moved(found: Usable) -> tuple[Usable, list[Motion]]:
-    """Estimate the motion of each segment; returns the samples as well, with better stamps if theirs are uneven."""
+    """Estimate the motion of each stretch; returns the samples as well, with better stamps if theirs are uneven."""
     s, notes, off_s = found.samples, list(found.notes), 0.0
-    spans = [slice(a, b) for a, b in found.segments]
+    spans = found.stretches
     positions, stamps = [s.q[span] for span in spans], [s.stamp[span] for span in spans]
     motions = motions_of(stamps, positions)
     for _ in range(_ROUNDS):
@@ -193,10 +183,7 @@ def moved(found: Usable) -> tuple[Usable, list[Motion]]:
             f"The positions' noise is {motions[0].noise.max():.2g} rad: speeds are of fits over"
             f" {2.0 * motions[0].half_s:.2g} s."
         )
-    time = s.stamp.copy()
-    for span, stamp in zip(spans, stamps, strict=True):
-        time[span] = stamp
-    return replace(found, samples=replace(s, stamp=time), notes=tuple(notes)), motions
+    return replace(found, samples=replace(s, stamp=np.concatenate(stamps)), notes=tuple(notes)), motions
 
 
 def _stamp_errors(
