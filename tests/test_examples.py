@@ -10,8 +10,8 @@ from pretouch.sensing.sensor import Capacitive
 from pretouch.sensing.skin import load_skin
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
-ELSEWHERE = "07_first_controller", "09_libfranka_program"
-"""The tutorial's runs below; the other against an arm: `tests/arms/franka/test_shielded_program.py`."""
+ELSEWHERE = "07_first_controller", "09_libfranka_program", "11_train_under_the_shield"
+"""The tutorial's runs below; the others in `tests/arms/franka/test_shielded_program.py`, `lab/tests/learning`."""
 
 
 @pytest.mark.parametrize("example", [e for e in EXAMPLES if e.stem not in ELSEWHERE], ids=lambda path: path.stem)

@@ -8,8 +8,7 @@ from pretouch.profiles import profile
 from pretouch.types import Mode
 from pretouch_lab.bench.avoidance_scenes import scenarios
 from pretouch_lab.learning import REACH
-from pretouch_lab.learning.environment import ALONE, ReachEnv, Reward
-from pretouch_lab.learning.scene import CYCLES, Scene
+from pretouch_lab.learning.environment import ALONE, CYCLES, ReachEnv, Reward, Scene
 
 TOWARDS_Y = np.array([0, 1, 0, 0, 0, 0], np.float32)
 
@@ -130,7 +129,7 @@ def test_what_cannot_be_made_is_said():
     for scenes in (("srdo",), ("nowhere",)):
         with pytest.raises(ParameterError, match=f"nothing to reach in the scene '{scenes[0]}': choose from drdo"):
             ReachEnv(scenes=scenes)
-    with pytest.raises(ParameterError, match="There are no scenes"):
+    with pytest.raises(ParameterError, match="nothing to reach in the scene ''"):
         ReachEnv(scenes=())
     with pytest.raises(ParameterError, match="call reset"):
         ReachEnv().step(TOWARDS_Y)

@@ -1,17 +1,22 @@
 """`pretouch/Reach-v0`: reach places one after the other where people come into the arm's way."""
 
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import gymnasium
 import numpy as np
 from gymnasium.spaces import Box, Dict
 
+from pretouch import desired
+from pretouch.desired import Desired
 from pretouch.errors import ParameterError
-from pretouch.profiles import profile
-from pretouch.types import FloatArray
-from pretouch_lab.bench.avoidance_scenes import Scenario, arm, scenarios, skin
-from pretouch_lab.learning.scene import CYCLES, HELD, NEAR_M, ActionKind, Interface, Observation, Scene
+from pretouch.loop import Options, turn
+from pretouch.profiles import Profile, profile
+from pretouch.robot.model import RobotModel
+from pretouch.traces import mean_over
+from pretouch.types import ControlStep, FloatArray, RangeReadings, RangeStatus, RobotState
+from pretouch_lab.bench.avoidance_scenes import Scenario, arm, scenarios, setting, skin
+from pretouch_lab.trial import Simulation
 
 PEOPLE = ("person -y", "person +y", "beside", "inside", "walking")
 """Scenes of the avoidance benchmark with people."""
@@ -24,6 +29,137 @@ GOALS = 3
 """Goals held that end an episode."""
 _TIME_S = 12.0
 """Longest episode."""
+ActionKind = Literal["twist", "joint_velocities"]
+Observation = dict[str, FloatArray]
+
+CYCLES = 5
+"""Control cycles of a step: 0.05 s, within which an action does not go stale."""
+NEAR_M = 0.05
+"""The end-effector is at its goal within this."""
+HELD = 5
+"""Steps at the goal after which it is held."""
+SPEED_M_S = 0.3
+"""Velocity of the end-effector that an action of 1 along an axis asks for: the paper's speed."""
+TURN_RAD_S = 0.5
+"""Angular velocity, likewise."""
+_JOINT_SHARE = 0.25
+"""Share of a joint's largest velocity that an action of 1 asks for."""
+_SEEN_M = 1.0
+"""What is farther than this changes nothing that an arm does soon; a unit that sees nothing reads as this."""
+_MOST_M = 2.0
+"""Beyond the reach of an arm and of what it is asked."""
+_MEAN_STEPS = 20
+"""Physics steps that a peak force is the mean of, as in the benchmark: 20 ms."""
+_CLEAR_M = 0.15
+"""A goal is this far from what stands in the scene at the start."""
+_AWAY_M = 0.2
+"""And this far from where the end-effector is."""
+_DRAWS = 1000
+
+
+@dataclass(frozen=True)
+class Interface:
+    """Observations and actions of an arm with a skin of K units."""
+
+    model: RobotModel
+    units: int
+    """K."""
+    action: ActionKind = "twist"
+
+    def bounds(self) -> dict[str, tuple[FloatArray, FloatArray]]:
+        """Return the lowest and the highest value of each part of an observation."""
+        fast, far, model = 2.0 * self.model.description.qd_max, np.full(3, _MOST_M), self.model
+        return {
+            "ranges": (np.zeros(self.units), np.full(self.units, _SEEN_M)),
+            "q": (model.q_min - 0.1, model.q_max + 0.1),  # an encoder's noise, and what gives way in a contact
+            "qd": (-fast, fast),
+            "ee": (-far, far),
+            "goal": (-far, far),
+        }
+
+    def observe(self, robot: RobotState, readings: RangeReadings, goal: FloatArray) -> Observation:
+        """Return what a policy is given.
+
+        Args:
+            robot: state of the arm.
+            readings: of its K units.
+            goal: (3,) where the end-effector is to be [m], base frame.
+
+        Returns:
+            `ranges` (K,) the newest distances [m], 1 where a unit sees nothing nearer; `q` (n,) [rad]; `qd` (n,)
+            [rad/s]; `ee` (3,) position of the end-effector [m]; `goal` (3,) from there to the goal [m].
+        """
+        ee = self.model.kinematics(robot.q).position[self.model.ee]
+        ranges = np.where(readings.status == RangeStatus.OK, readings.distance, _SEEN_M)
+        parts = {"ranges": ranges, "q": robot.q, "qd": robot.qd, "ee": ee, "goal": goal - ee}
+        return {name: np.clip(parts[name], low, high).astype(np.float32) for name, (low, high) in self.bounds().items()}
+
+    @property
+    def scale(self) -> FloatArray:
+        """(6,) or (n,) what an action of 1 asks for [m/s, rad/s]."""
+        if self.action == "twist":
+            return np.repeat((SPEED_M_S, TURN_RAD_S), 3)
+        return _JOINT_SHARE * self.model.description.qd_max
+
+    def desired(self, stamp: float, action: FloatArray) -> Desired:
+        """Return what an action between -1 and 1 asks for, by the clock of the steps [s]."""
+        number = self.scale * np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
+        if self.action == "twist":
+            return desired.twist(stamp, number[:3], number[3:])
+        return desired.joint_velocities(stamp, number)
+
+
+class Scene:
+    """The arm of a scenario and a seed: the same errors, person and noise as the benchmark's trial of that seed."""
+
+    def __init__(self, scenario: Scenario, profile: Profile, skin: str, seed: int) -> None:
+        """Build it, and let the arm stand until contacts can be detected."""
+        made = setting(replace(scenario, params={**scenario.params, "skin": skin}), profile, seed)
+        setup = made.setup
+        self._path, self._shape, self.model = setup.path, made.shape, setup.model
+        self._arm = Simulation(setup)
+        self._state = self._arm.controller.init(self._arm.plant.read())
+        self._forces = np.zeros(_MEAN_STEPS - 1)
+        self.contacts = 0
+        """Times that something began to touch the arm."""
+        self.peak_force = 0.0
+        """Largest mean of the true force over 20 ms [N]."""
+        self.mean_force = 0.0
+        """Mean of the true force since `turn` was called last [N]."""
+        self.robot: RobotState
+        self.readings: RangeReadings
+        self.step = self.turn(desired.twist(self._arm.plant.time, np.zeros(3)), 1)
+        for _ in range(profile.window.samples):
+            self.turn(desired.twist(self.step.stamp, np.zeros(3)), 1)
+
+    @property
+    def ee_position(self) -> FloatArray:
+        """(3,) of the end-effector by the arm's sensors [m]."""
+        return self.model.kinematics(self.robot.q).position[self.model.ee]
+
+    def turn(self, asked: Desired, cycles: int) -> ControlStep:
+        """Let control cycles pass under what is asked, and return the last step; what is observed is of after it."""
+        options, arm = Options(desired=lambda: asked), self._arm
+        for _ in range(cycles):
+            cycle = turn(arm.controller, self._state, arm.plant, arm.skin, arm.clock.tick(), options)
+            self._state, self.step = cycle.after, cycle.step
+        self.robot, self.readings = cycle.inputs.robot, cycle.inputs.readings
+        log, touches = arm.plant.take_log()
+        forces = np.concatenate([self._forces, np.linalg.norm([force for _, force in log], axis=1)])
+        self._forces = forces[1 - _MEAN_STEPS :]
+        self.contacts += len(touches)
+        self.peak_force = max(self.peak_force, float(mean_over(forces, _MEAN_STEPS).max()))
+        self.mean_force = float(forces[_MEAN_STEPS - 1 :].mean())
+        return self.step
+
+    def goal(self, rng: np.random.Generator) -> FloatArray:
+        """Draw a place (3,) [m] on the scenario's path, away from the hand and from what stands in its way."""
+        shape = self._shape(self._arm.hand.position if self._arm.hand else np.zeros(3))
+        for _ in range(_DRAWS):
+            point = self._path.point(rng.uniform(0.0, self._path.length))
+            if np.linalg.norm(point - self.ee_position) > _AWAY_M and shape.closest(point)[0] > _CLEAR_M:
+                break
+        return point
 
 
 @dataclass(frozen=True)
@@ -40,16 +176,6 @@ class Reward:
     """Peak of the true force (mean of 20 ms) that ends an episode [N]: quasi-static limit of a hand (ISO/TS 15066)."""
     broken: float = 20.0
     """Lost where it is exceeded."""
-
-
-@dataclass(frozen=True)
-class _Choices:
-    """What an environment is made with."""
-
-    scenes: tuple[Scenario, ...]
-    profile: str
-    skin: str
-    reward: Reward = field(default_factory=Reward)
 
 
 class ReachEnv(gymnasium.Env):  # type: ignore[misc]  # not followed, see pyproject
@@ -82,10 +208,17 @@ class ReachEnv(gymnasium.Env):  # type: ignore[misc]  # not followed, see pyproj
             raise ParameterError(f"The action is {action!r}: choose twist or joint_velocities.")
         if skin_name not in SKINS:
             raise ParameterError(f"The skin is {skin_name!r}: choose from {', '.join(SKINS)}.")
-        self._choices = _Choices(_found(scenes), SHIELDED if shield else ALONE, skin_name, reward or Reward())
+        paths = {name: each for name, each in scenarios().items() if each.params["path"]["kind"] != "held"}
+        if wrong := [name for name in scenes or ("",) if name not in paths]:
+            raise ParameterError(
+                f"There is nothing to reach in the scene {wrong[0]!r}: choose from {', '.join(paths)}."
+            )
+        self._scenes = [paths[name] for name in scenes]
+        self._profile, self._skin = profile(SHIELDED if shield else ALONE), skin_name
+        self._reward = reward or Reward()
         self.interface = Interface(arm(), len(skin(skin_name)), action)
         bounds = self.interface.bounds()
-        self.observation_space = Dict({name: Box(*_float32(*pair)) for name, pair in bounds.items()})
+        self.observation_space = Dict({name: Box(*map(np.float32, pair)) for name, pair in bounds.items()})
         self.action_space = Box(-1.0, 1.0, self.interface.scale.shape, np.float32)
         self._scene: Scene | None = None
         self._goal, self._distance, self._begun = np.zeros(3), 0.0, 0.0
@@ -96,17 +229,18 @@ class ReachEnv(gymnasium.Env):  # type: ignore[misc]  # not followed, see pyproj
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode; `options` are not used."""
         super().reset(seed=seed)
-        chosen = self._choices
-        scenario = chosen.scenes[int(self.np_random.integers(len(chosen.scenes)))]
+        scenario = self._scenes[int(self.np_random.integers(len(self._scenes)))]
         number = int(self.np_random.integers(2**31)) if seed is None else seed
-        self._scene = Scene(scenario, profile(chosen.profile), chosen.skin, number)
+        self._scene = Scene(scenario, self._profile, self._skin, number)
         self._begun, self._goals = self._scene.step.stamp, 0
-        self._next_goal()
-        return self._observed(), self._info()
+        self._next_goal(self._scene)
+        return self._seen(self._scene)
 
     def step(self, action: FloatArray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Let a step pass; see the class."""
-        scene, reward = self._running(), self._choices.reward
+        scene, reward = self._scene, self._reward
+        if scene is None:
+            raise ParameterError("The episode has not begun: call reset() before step().")
         before = self._distance
         scene.turn(self.interface.desired(scene.step.stamp, action), CYCLES)
         self._distance = float(np.linalg.norm(self._goal - scene.ee_position))
@@ -115,46 +249,24 @@ class ReachEnv(gymnasium.Env):  # type: ignore[misc]  # not followed, see pyproj
         if self._at_goal == HELD:
             earned += reward.held
             self._goals += 1
-            self._next_goal()
+            self._next_goal(scene)
         broken = scene.peak_force > reward.bound_n
         earned -= reward.broken * broken
         over = broken or self._goals == GOALS
         late = scene.step.stamp - self._begun > _TIME_S - 1e-6
-        return self._observed(), float(earned), over, late and not over, self._info()
+        observation, info = self._seen(scene)
+        return observation, float(earned), over, late and not over, info
 
-    def _running(self) -> Scene:
-        if self._scene is None:
-            raise ParameterError("The episode has not begun: call reset() before step().")
-        return self._scene
-
-    def _next_goal(self) -> None:
-        scene = self._running()
+    def _next_goal(self, scene: Scene) -> None:
         self._goal, self._at_goal = scene.goal(self.np_random), 0
         self._distance = float(np.linalg.norm(self._goal - scene.ee_position))
 
-    def _observed(self) -> Observation:
-        scene = self._running()
-        return self.interface.observe(scene.robot, scene.readings, self._goal)
-
-    def _info(self) -> dict[str, Any]:
-        scene = self._running()
+    def _seen(self, scene: Scene) -> tuple[Observation, dict[str, Any]]:
         limited = scene.step.limited
-        return {
-            "contacts": scene.contacts, "peak_force_n": scene.peak_force, "goals": self._goals,
-            "limited": limited.by.value, "share": limited.share,
-        }  # fmt: skip
-
-
-def _found(names: tuple[str, ...]) -> tuple[Scenario, ...]:
-    """Look scenarios up, in which there is something to reach."""
-    known = {name: each for name, each in scenarios().items() if each.params["path"]["kind"] != "held"}
-    if wrong := [name for name in names if name not in known]:
-        raise ParameterError(f"There is nothing to reach in the scene {wrong[0]!r}: choose from {', '.join(known)}.")
-    if not names:
-        raise ParameterError(f"There are no scenes: choose from {', '.join(known)}.")
-    return tuple(known[name] for name in names)
-
-
-def _float32(low: FloatArray, high: FloatArray) -> tuple[Any, Any]:
-    """Return bounds as Gymnasium takes them for 32-bit numbers."""
-    return low.astype(np.float32), high.astype(np.float32)
+        return self.interface.observe(scene.robot, scene.readings, self._goal), {
+            "contacts": scene.contacts,
+            "peak_force_n": scene.peak_force,
+            "goals": self._goals,
+            "limited": limited.by.value,
+            "share": limited.share,
+        }
