@@ -9,8 +9,10 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.random_skin import Misplacement, misplaced
-from pretouch.sim.randomisation import SETS, WorldSet, drawn, with_own, world_set
+from pretouch.sim.randomisation import SETS, drawn, with_own, world_set
 from pretouch.sim.range_finder import RangeFinderParams
+
+named_set = cache(world_set)
 
 
 @dataclass(frozen=True)
@@ -25,11 +27,6 @@ class Parts:
     """Where the controller believes them to be; None: it knows the truth."""
 
 
-@cache
-def _set(name: str) -> WorldSet:
-    return world_set(name)
-
-
 def randomised(name: str, seed: int, model: RobotModel, parts: Parts) -> Parts:
     """Return the parts of a trial as its seed draws them of a set; as they are with no name.
 
@@ -38,7 +35,7 @@ def randomised(name: str, seed: int, model: RobotModel, parts: Parts) -> Parts:
     if not name:
         return parts
     usual = plant_params_of(model.description)
-    world = drawn(_set(name), seed, usual)
+    world = drawn(named_set(name), seed, usual)
     believed, off = parts.believed, world.misplaced
     if believed is None and off != Misplacement() and len(parts.skin):
         believed = misplaced(parts.skin, model, off, seed)[0]
@@ -58,8 +55,7 @@ def folder_part(name: str) -> str:
 
 def sentence(name: str) -> str:
     """Say with which set something was played, or nothing of the usual arm."""
-    return (
-        f"Domain randomisation {name}: other arms and sensors than those of the published tables. {_set(name).about}"
-        if name
-        else ""
-    )
+    if not name:
+        return ""
+    about = named_set(name).about
+    return f"Domain randomisation {name}: other arms and sensors than those of the published tables. {about}"

@@ -25,11 +25,12 @@ from pretouch.extras import Extra
 from pretouch.profiles import profile
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.randomisation import drawn, with_own, world_set
+from pretouch.sim.randomisation import drawn, with_own
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.text_table import TextTable
 from pretouch_lab.bench.dense_skin import spread_skin
 from pretouch_lab.bench.scenes import SeedRange, model, plant_of, scenario
+from pretouch_lab.domain_randomisation import named_set
 from pretouch_lab.experiment import Context, experiment
 from pretouch_lab.run import Play, Row
 from pretouch_lab.table import Column, rounded, summary, table
@@ -41,7 +42,6 @@ _SEED_RANGES: dict[SeedRange, tuple[int, int]] = {"published": (0, 999), "develo
 _DESIGN_SEED, _RESAMPLING_SEED, _RESAMPLES = 20_211_116, 2021, 500
 _INDICES = {"first": "S1", "first_95": "S1_conf", "total": "ST", "total_95": "ST_conf"}
 """Indices with 95 % intervals, as SALib names them."""
-_world = cache(world_set)
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def setting(name: str, profile_text: str, values: Mapping[str, Value], seed: int
         raise ExperimentError(f"The arm plant.kind={kind} is unknown: choose from {', '.join(scenario('arms'))}.")
     params["plant"] = plant_of(kind)
     if world:
-        by_seed = drawn(_world(world), seed, PlantParams())
+        by_seed = drawn(named_set(world), seed, PlantParams())
         params["plant"] = with_own(by_seed.plant, params["plant"], PlantParams())
         params["sensing"] = by_seed.ranging
     plant, ranging, skin, scene = (changed(params[group], own, group) for group, own in changes.items())
@@ -309,20 +309,20 @@ def found_in(sweep: Sweep, rows: list[Row], metrics: Sequence[str]) -> dict[str,
     return {one.name: summary(rows, [one.name], metrics) for one in sweep.vary}
 
 
-def tables(sweep: Sweep, found: dict[str, list[Row]], metrics: Sequence[str]) -> list[TextTable]:
+def tables(sweep: Sweep, results: dict[str, list[Row]], metrics: Sequence[str]) -> list[TextTable]:
     """Return a table for each metric of a Sobol design, or for each parameter of a grid."""
     fixed = "".join(f" {name} = {value}." for name, value in sweep.fixed.items())
     note = f"Profile {sweep.profile}, arms {sweep.seeds[0]} to {sweep.seeds[-1]}.{fixed}"
-    made = []
-    for name, rows in found.items():
+    every = []
+    for name, rows in results.items():
         if sweep.design == "grid":
             columns = [Column(name, name), *(Column(metric, metric, 3, band=True) for metric in metrics)]
             text = f"{note} Medians of {rows[0]['trials']} cells, with 10 to 90 %."
         else:
             columns = [Column(key, key, 2 if key in _INDICES else None) for key in ("parameter", "range", *_INDICES)]
             text = f"{note} {rows[0]['blocks']} of {rows[0]['of']} blocks have a value."
-        made.append(table(f"{sweep.experiment}: {name}", columns, rows, text))
-    return made
+        every.append(table(f"{sweep.experiment}: {name}", columns, rows, text))
+    return every
 
 
 def sobol_figure(indices: dict[str, list[Row]]) -> Figure:

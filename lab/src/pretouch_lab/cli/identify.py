@@ -58,42 +58,42 @@ class Identify:
         with numbers_to(self.json) as write:
             arm = RobotModel(robot_named(self.arm)) if self.arm else None
             samples, model, source = read_free_motion(Path(self.file), arm, self.sign)
-            found = identify(samples, model, plant_params_of(model.description))
+            result = identify(samples, model, plant_params_of(model.description))
             if figure:
                 image = BytesIO()
-                residual_figure(found, model, self.file).savefig(image, format=figure.suffix[1:], dpi=120)
+                residual_figure(result, model, self.file).savefig(image, format=figure.suffix[1:], dpi=120)
                 with unwritable_said("figure", figure):
                     figure.write_bytes(image.getvalue())
             if out:
                 with unwritable_said("file", out):
-                    atomic_write(out, arm_toml(found, model, Path(self.file).name))
-            _show(found, model, source)
+                    atomic_write(out, arm_toml(result, model, Path(self.file).name))
+            _show(result, model, source)
             for what, place in (("Arm", out), ("Figure", figure)):
                 if place:
                     print(f"{what}: {place}")
-            write(_numbers(found, model, self.file))
+            write(_numbers(result, model, self.file))
 
 
-def _show(found: "Identified", model: "RobotModel", source: str) -> None:
+def _show(result: "Identified", model: "RobotModel", source: str) -> None:
     from rich.console import Console
 
     from pretouch.cli.tables import PlainTable
 
     console = Console(highlight=False, soft_wrap=True)
-    for line in (f"{source}. {found.seconds:.0f} s of free motion are used.", *found.notes):
+    for line in (f"{source}. {result.seconds:.0f} s of free motion are used.", *result.notes):
         console.print(line, markup=False)
-    rows = found.of_joints()
+    rows = result.of_joints()
     columns = [
         [_shown(*each) for each in zip(row.values, row.standard_errors, row.identified, strict=True)] for row in rows
     ]
     table = [[joint, *cells] for joint, *cells in zip(model.joints, *columns, strict=True)]
     console.print(PlainTable(["joint", *(row.name for row in rows)], table), crop=False)
-    payload, error = found.fit.payload
+    payload, error = result.fit.payload
     lines = [f"Payload {payload:.3f} +- {error:.3f} kg."]
-    if found.has_velocities:
+    if result.has_velocities:
         lines.append(
-            f"Velocity noise {found.noise.velocity_rad_s:.4f} rad/s; observer gain {found.fit.gain:.1f} +-"
-            f" {found.fit.errors[-1]:.1f} 1/s."
+            f"Velocity noise {result.noise.velocity_rad_s:.4f} rad/s; observer gain {result.fit.gain:.1f} +-"
+            f" {result.fit.errors[-1]:.1f} 1/s."
         )
     else:
         lines.append("Without velocities neither their noise nor the observer's gain is identified.")
@@ -111,10 +111,17 @@ def _shown(number: float, error: float, identified: bool) -> str:
     return text if identified else f"({text})"
 
 
-def _numbers(found: "Identified", model: "RobotModel", source: str) -> dict[str, Any]:
-    gain = [found.fit.gain, found.fit.errors[-1]] if found.has_velocities else None
+def _numbers(result: "Identified", model: "RobotModel", source: str) -> dict[str, Any]:
+    fitted, velocities = result.fit, result.has_velocities
     return {
-        "recording": source, "arm": model.description.name, "joints": model.joints, "used_s": found.seconds,
-        "notes": found.notes, "contact_spans_s": found.spans, "of_joints": found.of_joints(),
-        "payload_kg": found.fit.payload, "velocity_noise_rad_s": found.noise.velocity_rad_s, "observer_gain_1_s": gain,
-    }  # fmt: skip
+        "recording": source,
+        "arm": model.description.name,
+        "joints": model.joints,
+        "used_s": result.seconds,
+        "notes": result.notes,
+        "contact_spans_s": result.spans,
+        "of_joints": result.of_joints(),
+        "payload_kg": fitted.payload,
+        "velocity_noise_rad_s": result.noise.velocity_rad_s,
+        "observer_gain_1_s": [fitted.gain, fitted.errors[-1]] if velocities else None,
+    }

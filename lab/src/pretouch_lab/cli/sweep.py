@@ -46,36 +46,36 @@ class Sweep(Playing):
         """Play what is missing, with tables and figure."""
         from pretouch import __version__
         from pretouch.cli.writing import numbers_to, unwritable_said
-        from pretouch.sim.randomisation import world_set
         from pretouch_lab.cli.playing import begin, played, report
+        from pretouch_lab.domain_randomisation import named_set
         from pretouch_lab.sweep import EXPERIMENTS, SWEEP, found_in, sobol_figure, sweep_of, tables, trial
 
         vary, fix = self._pairs("vary", self.vary), self._pairs("fix", self.fix)
         sweep = sweep_of(self.experiment, vary, fix, self.profile, self.design, self.samples, self.arms, self.seeds)
         metrics = self.metrics or EXPERIMENTS[sweep.experiment].metrics
         if wrong := [name for name in metrics if name not in EXPERIMENTS[sweep.experiment].metrics]:
-            known = ", ".join(EXPERIMENTS[sweep.experiment].metrics)
-            raise ExperimentError(f"{sweep.experiment} does not measure {wrong[0]!r}: choose from {known}.")
+            names = ", ".join(EXPERIMENTS[sweep.experiment].metrics)
+            raise ExperimentError(f"{sweep.experiment} does not measure {wrong[0]!r}: choose from {names}.")
         SWEEP.need("A sweep")
         plays, out = sweep.plays(), self.folder("sweep")
         named = {cell["plant.world"] for cell, _ in plays if "plant.world" in cell}
-        worlds = {name: world_set(name).digest for name in sorted(named)}
+        worlds = {name: named_set(name).digest for name in sorted(named)}
         with numbers_to(self.json) as write:
             begin(self, out, {"sweep": sweep.experiment, "profile": sweep.profile, "worlds_sha256": worlds})
             rows = played("sweep", partial(trial, sweep.experiment, sweep.profile), plays, out, self)
             for reason, count in Counter(row["failed"] for row in rows if row["failed"]).items():
                 again = "Take their lines out of rows.jsonl to try again."
                 print(f"{count} cells failed: {reason} {again}", file=sys.stderr)
-            found, place = found_in(sweep, rows, metrics), out / f"{sweep.experiment}.csv"
-            figures = [(sweep.experiment, "Sobol indices", sobol_figure(found))] if sweep.design == "sobol" else []
-            report(tables(sweep, found, metrics), figures, out)
+            results, place = found_in(sweep, rows, metrics), out / f"{sweep.experiment}.csv"
+            figures = [(sweep.experiment, "Sobol indices", sobol_figure(results))] if sweep.design == "sobol" else []
+            report(tables(sweep, results, metrics), figures, out)
             with unwritable_said("file", place), place.open("w", newline="", encoding="utf-8") as file:
                 writer = csv.DictWriter(file, rows[0])
                 writer.writeheader()
                 writer.writerows(rows)
             print(f"Cells: {place}")
             about = {"version": __version__, "experiment": sweep.experiment, "profile": sweep.profile}
-            write(about | {"vary": vary, "fixed": fix, "found": found})
+            write(about | {"vary": vary, "fixed": fix, "results": results})
 
     def _pairs(self, option: str, texts: tuple[str, ...]) -> dict[str, str]:
         """Read NAME=TEXT, each name once; files of worlds as workers elsewhere may read them."""

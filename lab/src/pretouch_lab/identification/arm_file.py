@@ -13,20 +13,20 @@ from pretouch_lab.identification.identify import Identified
 _MOST_POINTS = 4000
 
 
-def arm_toml(found: Identified, model: RobotModel, source: str) -> str:
+def arm_toml(result: Identified, model: RobotModel, source: str) -> str:
     """Return the file's text; what could not be identified keeps its usual value, and a comment says so."""
-    fitted, noise = found.fit, found.noise
-    share = 1.0 - found.usual.friction_compensated
+    fitted, noise, usual = result.fit, result.noise, result.usual
+    share = 1.0 - usual.friction_compensated
     origin = "".join(c if c.isprintable() and c not in '"\\' else "_" for c in source)
     lines = [
-        f'about = "An arm identified from {origin}: {found.seconds:.0f} s of free motion."',
+        f'about = "An arm identified from {origin}: {result.seconds:.0f} s of free motion."',
         "",
-        f"# friction_compensated stays at {found.usual.friction_compensated:g}: only what is not compensated shows, so",
+        f"# friction_compensated stays at {usual.friction_compensated:g}: only what is not compensated shows, so",
         f"# friction_f1_nm is that, divided by {share:g}.",
-        f"# torque_noise_hz stays at {found.usual.torque_noise_hz:g}: the observer hides it.",
+        f"# torque_noise_hz stays at {usual.torque_noise_hz:g}: the observer hides it.",
         "# stiffness, damping, rotor inertia and delays stay as they are: a residual does not tell them.",
     ]
-    for row in found.of_joints():
+    for row in result.of_joints():
         values, errors = row.values, row.standard_errors
         if row.field == "friction_f1_nm":
             values, errors = np.maximum(values, 0.0) / share, errors / share
@@ -40,13 +40,13 @@ def arm_toml(found: Identified, model: RobotModel, source: str) -> str:
         if len(moved):  # links behind the same joint are off alike
             number = OWN * model.n + moved[-1]
             factors[link], errors[link] = max(1.0 + fitted.numbers[number], 0.05), fitted.errors[number]
-    masses = next(row for row in found.of_joints() if row.field == "")
+    masses = next(row for row in result.of_joints() if row.field == "")
     unsure = ", ".join(model.joints[j] for j in np.flatnonzero(~masses.identified))
     note = f"# the links behind {unsure}: what was assumed before is hardly changed"
     lines += _field("mass_factors", _list(factors), _list(errors), note if unsure else "")
     payload, error = fitted.payload
     lines += _field("payload_kg", f"{max(payload, 0.0):.6g}", f"{error:.3g}")
-    if found.has_velocities:
+    if result.has_velocities:
         lines += _field("velocity_noise_rad_s", f"{noise.velocity_rad_s:.6g}", f"{noise.velocity_error_rad_s:.3g}")
         lines += _field("observer_gain_1_s", f"{fitted.gain:.6g}", f"{float(fitted.errors[-1]):.3g}")
     else:
@@ -66,16 +66,16 @@ def _list(values: Iterable[float] | FloatArray) -> str:
     return f"[{', '.join(f'{float(v):.6g}' if abs(v) >= 1e-6 else '0.0' for v in values)}]"
 
 
-def residual_figure(found: Identified, model: RobotModel, title: str) -> Figure:
+def residual_figure(result: Identified, model: RobotModel, title: str) -> Figure:
     """Draw what was to be explained and what is, one row a joint."""
     figure = Figure(figsize=(9, 1.6 * model.n + 1), layout="constrained")
     panels = figure.subplots(model.n, 1, sharex=True, squeeze=False)[:, 0]
-    stamp = found.samples.stamp
+    stamp = result.samples.stamp
     time, every = stamp - stamp[0], max(1, len(stamp) // _MOST_POINTS)
     for j, axes in enumerate(panels):
-        axes.plot(time[::every], found.samples.tau[::every, j], color="0.7", lw=0.6, label="residual")
-        axes.plot(time[::every], found.fit.expected[::every, j], color="tab:blue", lw=0.9, label="explained")
-        for k, (begin, end) in enumerate(found.spans):
+        axes.plot(time[::every], result.samples.tau[::every, j], color="0.7", lw=0.6, label="residual")
+        axes.plot(time[::every], result.fit.expected[::every, j], color="tab:blue", lw=0.9, label="explained")
+        for k, (begin, end) in enumerate(result.spans):
             label = "left out" if k == 0 else None
             axes.axvspan(begin - stamp[0], end - stamp[0], color="tab:red", alpha=0.2, label=label)
         axes.set_ylabel(f"{model.joints[j]}\n[Nm]", fontsize="small")

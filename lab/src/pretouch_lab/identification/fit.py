@@ -74,12 +74,12 @@ class Columns:
     """(N,) samples in and shortly before which no joint's speed changes quickly: there its derivative is known."""
 
 
-def columns_of(found: Usable, motions: list[Motion], model: RobotModel) -> Columns:
+def columns_of(data: Usable, motions: list[Motion], model: RobotModel) -> Columns:
     """Work out all that does not depend on what is to be found."""
-    s, n = found.samples, model.n
+    s, n = data.samples, model.n
     kick, noise, calm = np.zeros(s.q.shape), np.zeros(s.q.shape), np.zeros(len(s.stamp), np.bool_)
     positions, speeds, carried, masses = [], [], [], []
-    for span, motion in zip(found.stretches, motions, strict=True):
+    for span, motion in zip(data.stretches, motions, strict=True):
         time, path = s.stamp[span], motion.between()
         masses.append(np.array([model.mass_matrix(q) for q in motion.q]))
         x = np.empty((len(motion.q), n, features_of(n)))
@@ -96,7 +96,7 @@ def columns_of(found: Usable, motions: list[Motion], model: RobotModel) -> Colum
     if s.qd is not None and calm.any():
         # part of what differs is the derivatives' own noise: on average this share is the velocities'
         share = np.maximum(1.0 - (motions[0].speed_noise / joint_scale(noise[calm])) ** 2, 0.0)
-        for span, motion, M in zip(found.stretches, motions, masses, strict=True):
+        for span, motion, M in zip(data.stretches, motions, masses, strict=True):
             kick[span] = np.einsum("tij,tj->ti", on_grid(s.stamp[span], motion.at[0], GRID_S, M), share * noise[span])
     square = (np.concatenate(masses) ** 2).mean(axis=0)
     return Columns(motions, positions, speeds, carried, kick, noise, square, calm)
@@ -125,26 +125,26 @@ def _noise(measured: FloatArray, speed: FloatArray, growth: FloatArray, calm: Bo
     return noise
 
 
-def _late(found: Usable, values: list[FloatArray], spacing: float, ahead: list[float], pole: float) -> FloatArray:
+def _late(data: Usable, values: list[FloatArray], spacing: float, ahead: list[float], pole: float) -> FloatArray:
     """Filter values (F, ...) of each stretch, so far apart [s], with one pole; return them at the samples (N, ...)."""
     rows = []
-    for span, each in zip(found.stretches, values, strict=True):
-        time = found.samples.stamp[span]
+    for span, each in zip(data.stretches, values, strict=True):
+        time = data.samples.stamp[span]
         smooth, _ = lfilter(ahead, [1.0, -pole], each, axis=0, zi=(1.0 - ahead[0]) * each[:1])
         rows.append(on_grid(time, time[0], spacing, smooth))
     return np.concatenate(rows)
 
 
-def low_passed(found: Usable, fine_values: list[FloatArray], gain: float) -> FloatArray:
+def low_passed(data: Usable, fine_values: list[FloatArray], gain: float) -> FloatArray:
     """Low-pass values (F, ...) of each stretch as the observer does, and return them at the samples (N, ...)."""
     part = gain * _FINE_S / (1.0 + gain * _FINE_S)
-    return _late(found, fine_values, _FINE_S, [part], 1.0 - part)
+    return _late(data, fine_values, _FINE_S, [part], 1.0 - part)
 
 
-def carried_late(found: Usable, columns: Columns, gain: float) -> FloatArray:
+def carried_late(data: Usable, columns: Columns, gain: float) -> FloatArray:
     """Return `carried` at the samples (N, n, n + 1) after the low-pass, by the trapezoidal rule: it changes slowly."""
     half = 0.5 * gain * GRID_S
-    return _late(found, columns.carried, GRID_S, 2 * [half / (1.0 + half)], (1.0 - half) / (1.0 + half))
+    return _late(data, columns.carried, GRID_S, 2 * [half / (1.0 + half)], (1.0 - half) / (1.0 + half))
 
 
 def friction_parts(speed: FloatArray, steepness: FloatArray, asymmetry: FloatArray) -> tuple[FloatArray, ...]:
@@ -186,17 +186,17 @@ class Fit:
         return which[: OWN * n].reshape(n, OWN)
 
 
-def fit(found: Usable, columns: Columns, used: BoolArray, usual: PlantParams, payload: bool = True) -> Fit:
+def fit(data: Usable, columns: Columns, used: BoolArray, usual: PlantParams, payload: bool = True) -> Fit:
     """Find all parts from the samples that are used (N,); without `payload` that stays 0."""
-    n, cycles = found.samples.q.shape[1], np.array(usual.ripple_cycles)
+    n, cycles = data.samples.q.shape[1], np.array(usual.ripple_cycles)
     start, priors = _begin(n, usual, payload)
     theta, gain = start.copy(), usual.observer_gain_1_s
     kicks = bool(columns.kick.any())
     precision = np.diag(priors**-2.0)
-    carried = carried_late(found, columns, gain)
+    carried = carried_late(data, columns, gain)
     for _ in range(_ROUNDS):
-        X, expected = design(found, columns, carried, theta, gain, cycles)
-        left = found.samples.tau - expected - theta[-1] * columns.kick
+        X, expected = design(data, columns, carried, theta, gain, cycles)
+        left = data.samples.tau - expected - theta[-1] * columns.kick
         scale = joint_scale(left[used])
         weight = (_TAILS + 1.0) / (_TAILS + (left / scale) ** 2) / scale**2 * used[:, None]
         H, g = precision.copy(), precision @ (start - theta)
@@ -212,14 +212,14 @@ def fit(found: Usable, columns: Columns, used: BoolArray, usual: PlantParams, pa
         sure = np.linalg.inv(H)[-1, -1] ** 0.5 < 0.05 * abs(theta[-1])
         new = theta[-1] / (1.0 - theta[-1] * usual.period_s) if kicks and sure and theta[-1] > 0.0 else gain
         if abs(new - gain) > 0.001 * gain:
-            carried = carried_late(found, columns, new)
+            carried = carried_late(data, columns, new)
         done, gain = bool(np.all(np.abs(step) < _SETTLED * priors)), new
         if done:
             break
-    X, expected = design(found, columns, carried, theta, gain, cycles)
+    X, expected = design(data, columns, carried, theta, gain, cycles)
     kicked = theta[-1] * columns.kick
-    score = np.einsum("ijp,ij->ip", X, (found.samples.tau - expected - kicked) * weight)
-    return Fit(theta, _standard_errors(found, H, precision, score), priors, gain, expected, kicked)
+    score = np.einsum("ijp,ij->ip", X, (data.samples.tau - expected - kicked) * weight)
+    return Fit(theta, _standard_errors(data, H, precision, score), priors, gain, expected, kicked)
 
 
 def _begin(n: int, usual: PlantParams, payload: bool) -> tuple[FloatArray, FloatArray]:
@@ -234,16 +234,16 @@ def _begin(n: int, usual: PlantParams, payload: bool) -> tuple[FloatArray, Float
 
 
 def design(
-    found: Usable, columns: Columns, carried: FloatArray, theta: FloatArray, gain: float, cycles: FloatArray
+    data: Usable, columns: Columns, carried: FloatArray, theta: FloatArray, gain: float, cycles: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the derivatives (N, n, p) of the residual by all numbers, and what they explain (N, n) [Nm]."""
-    count, n = found.samples.q.shape
+    count, n = data.samples.q.shape
     own = theta[: OWN * n].reshape(n, OWN)
     shapes = []
     for q, speed in zip(columns.q, columns.speed, strict=True):
         friction = friction_parts(speed, np.exp(own[:, 2]), own[:, 3])
         shapes.append(np.stack([*friction, np.sin(cycles * q), np.cos(cycles * q)], axis=1))
-    late = low_passed(found, shapes, gain)
+    late = low_passed(data, shapes, gain)
     late[:, 1:3] *= own[:, 1]  # derivatives by what the friction's F1 multiplies
     X = np.zeros((count, n, len(theta)))
     for j in range(n):
@@ -257,9 +257,9 @@ def design(
     return X, X @ linear
 
 
-def _standard_errors(found: Usable, H: FloatArray, precision: FloatArray, score: FloatArray) -> FloatArray:
+def _standard_errors(data: Usable, H: FloatArray, precision: FloatArray, score: FloatArray) -> FloatArray:
     """Errors (p,) by the scores (N, p) of the samples, with the usual correction for the number of blocks."""
-    time = found.samples.stamp
+    time = data.samples.stamp
     block = ((time - time[0]) / BLOCK_S).astype(np.int64)
     scores = np.zeros((int(block.max()) + 1, score.shape[1]))
     np.add.at(scores, block, score)

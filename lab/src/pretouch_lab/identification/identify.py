@@ -107,26 +107,26 @@ def identify(samples: ArmSamples, model: RobotModel, usual: PlantParams) -> Iden
             f"The recording has {samples.q.shape[1]} joints and {samples.tau.shape[1]} torques, and"
             f" {model.description.name} has {model.n} joints: give the arm it is of."
         )
-    found, motions = moved(usable(samples))
-    columns, notes = columns_of(found, motions, model), [*found.notes]
+    data, motions = moved(usable(samples))
+    columns, notes = columns_of(data, motions, model), [*data.notes]
     used = columns.calm
-    even_s = float(used.sum()) * found.period
+    even_s = float(used.sum()) * data.period
     if even_s < LEAST_S:
         raise CalibrationError(
             f"The arm's speed changes so often that {even_s:.1f} s of even motion are left: record {LEAST_S:g} s or"
             " more along smooth paths, or slower."
         )
     for _ in range(_ROUNDS):
-        fitted = fit(found, columns, used, usual)
-        free, spans = free_samples(found, fitted)
+        fitted = fit(data, columns, used, usual)
+        free, spans = free_samples(data, fitted)
         again = columns.calm & free
         if np.array_equal(again, used):
             break
         used = again
     if fitted.payload[0] < 0.0:
-        fitted = fit(found, columns, used, usual, payload=False)
+        fitted = fit(data, columns, used, usual, payload=False)
         notes.append("The payload comes out below zero: it is 0, and the masses of the links take the rest.")
-    seconds = float(used.sum()) * found.period
+    seconds = float(used.sum()) * data.period
     if seconds < LEAST_S:
         raise CalibrationError(
             f"Only {seconds:.1f} s of free motion are left without what looks like contacts: record {LEAST_S:g} s or"
@@ -141,26 +141,26 @@ def identify(samples: ArmSamples, model: RobotModel, usual: PlantParams) -> Iden
             f" {model.description.name}, its torques have the other sign (--sign), or gravity is still in them."
         )
     if spans:
-        first = found.samples.stamp[0]
+        first = data.samples.stamp[0]
         listed = ", ".join(f"{a - first:.1f} to {b - first:.1f}" for a, b in spans[:8])
         notes.append(
             f"{len(spans)} spans look like contacts and are left out (seconds from the first sample): {listed}"
             f"{' and more' if len(spans) > 8 else ''}."
         )
-    noise = noise_of(found, columns, fitted, used, usual)
-    return Identified(fitted, noise, found.samples, spans, tuple(notes), seconds, usual)
+    noise = noise_of(data, columns, fitted, used, usual)
+    return Identified(fitted, noise, data.samples, spans, tuple(notes), seconds, usual)
 
 
-def free_samples(found: Usable, fitted: Fit) -> tuple[BoolArray, tuple[tuple[float, float], ...]]:
+def free_samples(data: Usable, fitted: Fit) -> tuple[BoolArray, tuple[tuple[float, float], ...]]:
     """Say which samples (N,) are of free motion, and from when to when [s] something else is.
 
     What a contact does lasts longer than noise: means over `_CONTACT_S` are compared with how far such means usually
     are off. CalibrationError if too much looks like that.
     """
-    stamp, left = found.samples.stamp, found.samples.tau - fitted.expected
-    length = max(round(_CONTACT_S / found.period), 1)
+    stamp, left = data.samples.stamp, data.samples.tau - fitted.expected
+    length = max(round(_CONTACT_S / data.period), 1)
     means = np.zeros_like(left)
-    for span in found.stretches:
+    for span in data.stretches:
         count = span.stop - span.start
         total = np.cumsum(np.vstack([np.zeros((1, left.shape[1])), left[span]]), axis=0)
         ends = np.minimum(np.arange(count) + length // 2 + 1, count)
@@ -168,7 +168,7 @@ def free_samples(found: Usable, fitted: Fit) -> tuple[BoolArray, tuple[tuple[flo
         means[span] = (total[ends] - total[begins]) / (ends - begins)[:, None]
     far = np.any(np.abs(means - np.median(means, axis=0)) > _CONTACT_SIGMAS * joint_scale(means), axis=1)
     used, spans = np.ones(len(stamp), np.bool_), []
-    for span in found.stretches:
+    for span in data.stretches:
         times = stamp[span][far[span]]
         for group in np.split(times, np.flatnonzero(np.diff(times) > 2.0 * _MARGIN_S) + 1):
             if len(group):
@@ -184,14 +184,14 @@ def free_samples(found: Usable, fitted: Fit) -> tuple[BoolArray, tuple[tuple[flo
     return used, tuple(spans)
 
 
-def noise_of(found: Usable, columns: Columns, fitted: Fit, used: BoolArray, usual: PlantParams) -> Noise:
+def noise_of(data: Usable, columns: Columns, fitted: Fit, used: BoolArray, usual: PlantParams) -> Noise:
     """Take the noise of the samples that are used (N,) apart."""
-    left = found.samples.tau - fitted.expected - fitted.kicked
+    left = data.samples.tau - fitted.expected - fitted.kicked
     # what is five deviations off is cut: one outlier would be most of a variance
     bound = 5.0 * joint_scale(left[used])
     square = np.clip(left - np.median(left[used], axis=0), -bound, bound) ** 2
-    length = round(BLOCK_S / found.period)
-    begins = [begin for span in found.stretches for begin in range(span.start, span.stop - length, length)]
+    length = round(BLOCK_S / data.period)
+    begins = [begin for span in data.stretches for begin in range(span.start, span.stop - length, length)]
     blocks = np.array(
         [square[begin : begin + length].mean(axis=0) for begin in begins if used[begin : begin + length].all()]
     )
@@ -201,7 +201,7 @@ def noise_of(found: Usable, columns: Columns, fitted: Fit, used: BoolArray, usua
             " Record longer, along smoother paths, with nothing touching the arm."
         )
     noise, velocity = columns.velocity_noise[used], np.nan
-    if found.samples.qd is not None:  # the derivatives' noise is in what differs, too
+    if data.samples.qd is not None:  # the derivatives' noise is in what differs, too
         excess = float(np.mean(joint_scale(noise) ** 2 - columns.motion[0].speed_noise ** 2))
         velocity = float(np.sqrt(max(excess, _LEAST_VELOCITY_RAD_S**2)))
     variance = blocks.mean(axis=0)

@@ -77,14 +77,14 @@ class Motion:
 def motions_of(times: list[FloatArray], positions: list[FloatArray]) -> list[Motion]:
     """Estimate the motion in stretches with stamps (N,) [s] and positions (N, n) [rad], all by a fit of one width."""
     grids = [time[0] + GRID_S * np.arange(int((time[-1] - time[0]) / GRID_S) + 2) for time in times]
-    given = list(zip(times, positions, grids, strict=True))
+    samples = list(zip(times, positions, grids, strict=True))
     noise = position_noise(times, positions, HALVES_S[0])
     for half in HALVES_S:
-        fits = [local_cubic(*each, half) for each in given]
+        fits = [local_cubic(*each, half) for each in samples]
         gain = np.median(np.concatenate([gains for _, gains in fits]), axis=0)
         if noise.max() * gain[1] <= _SURE_RAD_S and noise.max() * gain[2] <= _SURE_RAD_S2:
             break
-    narrow = [local_cubic(*each, 0.5 * half)[0][1] for each in given]
+    narrow = [local_cubic(*each, 0.5 * half)[0][1] for each in samples]
     differs = [speed - fitted[1] for speed, (fitted, _) in zip(narrow, fits, strict=True)]
     allowed = _ROUNDED_RAD_S + _SIGMAS * joint_scale(np.concatenate(differs))
     motions = []
@@ -158,10 +158,10 @@ def _nearest(time: FloatArray, at: FloatArray) -> FloatArray:
     return np.asarray(np.min(ways, axis=0))
 
 
-def moved(found: Usable) -> tuple[Usable, list[Motion]]:
+def moved(data: Usable) -> tuple[Usable, list[Motion]]:
     """Estimate the motion of each stretch; returns the samples as well, with better stamps if theirs are uneven."""
-    s, notes, off_s = found.samples, list(found.notes), 0.0
-    spans = found.stretches
+    s, notes, off_s = data.samples, list(data.notes), 0.0
+    spans = data.stretches
     positions, stamps = [s.q[span] for span in spans], [s.stamp[span] for span in spans]
     motions = motions_of(stamps, positions)
     for _ in range(_ROUNDS):
@@ -183,7 +183,7 @@ def moved(found: Usable) -> tuple[Usable, list[Motion]]:
             f"The positions' noise is {motions[0].noise.max():.2g} rad: speeds are of fits over"
             f" {2.0 * motions[0].half_s:.2g} s."
         )
-    return replace(found, samples=replace(s, stamp=np.concatenate(stamps)), notes=tuple(notes)), motions
+    return replace(data, samples=replace(s, stamp=np.concatenate(stamps)), notes=tuple(notes)), motions
 
 
 def _stamp_errors(

@@ -114,9 +114,9 @@ class Scene:
 
     def __init__(self, scenario: Scenario, profile: Profile, skin: str, seed: int) -> None:
         """Build it, and let the arm stand until contacts can be detected."""
-        made = setting(replace(scenario, params={**scenario.params, "skin": skin}), profile, seed)
-        setup = made.setup
-        self._path, self._shape, self.model = setup.path, made.shape, setup.model
+        scene = setting(replace(scenario, params={**scenario.params, "skin": skin}), profile, seed)
+        setup = scene.setup
+        self._path, self._shape, self.model = setup.path, scene.shape, setup.model
         self._arm = Simulation(setup)
         self._state = self._arm.controller.init(self._arm.plant.read())
         self._forces = np.zeros(_MEAN_STEPS - 1)
@@ -137,9 +137,9 @@ class Scene:
         """(3,) of the end-effector by the arm's sensors [m]."""
         return self.model.kinematics(self.robot.q).position[self.model.ee]
 
-    def turn(self, asked: Desired, cycles: int) -> ControlStep:
+    def turn(self, target: Desired, cycles: int) -> ControlStep:
         """Let control cycles pass under what is asked, and return the last step; what is observed is of after it."""
-        options, arm = Options(desired=lambda: asked), self._arm
+        options, arm = Options(desired=lambda: target), self._arm
         for _ in range(cycles):
             cycle = turn(arm.controller, self._state, arm.plant, arm.skin, arm.clock.tick(), options)
             self._state, self.step = cycle.after, cycle.step
