@@ -106,7 +106,8 @@ def skin(name: str, of: str = PANDA) -> Skin:
 def setting(scenario: Scenario, profile: Profile, seed: int, name: str = PANDA) -> Setting:
     """Make the setting of a trial with the arm of a name."""
     params, model = scenario.params, arm(name)
-    path, units = path_of(params["path"], place(name)), skin(params["skin"], name)
+    path = path_of(params["path"], place(name))
+    units = skin(params["skin"], name) if profile.perception else Skin((), model)  # none measures what nobody reads
     error = params.get("misplaced")
     shape, scene = _obstacle(params, seed, name)
     setup = Setup(
