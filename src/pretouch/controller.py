@@ -14,10 +14,10 @@ from pretouch.contact.residual_model import ResidualModel, SequentialState
 from pretouch.control.approach import MotionBody
 from pretouch.control.joint_box import joint_limits
 from pretouch.control.path import Path, nearest_phase
-from pretouch.decision import Decision
+from pretouch.decision import Decision, move_restricted
 from pretouch.errors import RobotStateError, SkinError
 from pretouch.faults import Watched, begin_watch, robot_of, take_sent
-from pretouch.line import CHECK, MOVE, line
+from pretouch.line import ASK, CHECK, MOVE, line
 from pretouch.line_records import PYTHON, SEQUENTIAL
 from pretouch.line_setup import fixed_of, kinds_of, now_init, remembered_init
 from pretouch.modes import CLEAR, SOLVED, ModeState, mode_init
@@ -154,9 +154,15 @@ class Controller:
             now = self.blank.copy()
             if self._usual.copied(now, inputs):
                 self.put_path(now, remembered.get("pace.phase"))
-                if self.take(memory, now, self.beside, CHECK, MOVE) and now.get("answer.ending") == SOLVED:
-                    return ControlStep.of(now, CLEAR), ControllerState(
-                        memory, CLEAR, state.detector, state.reaction, state.approach, None, True
+                approach, last = state.approach, MOVE if self.approach is None else ASK
+                calm, known = self.take(memory, now, self.beside, CHECK, last), dict[str, Any]()
+                if calm and self.approach is not None:
+                    known["desired_velocity"] = now.get("request.velocity").copy()  # a restriction may add to it
+                    robot = robot_of(now.part("robot", Report))
+                    approach = move_restricted(self, self.approach, approach, memory, now, robot)
+                if calm and now.get("answer.ending") == SOLVED:
+                    return ControlStep.of(now, CLEAR, **known), ControllerState(
+                        memory, CLEAR, state.detector, state.reaction, approach, None, True
                     )
                 memory = remembered.copy()
         step, after = Decision(self, state, memory).taken(inputs)

@@ -69,10 +69,11 @@ class Decision:
         }  # fmt: skip
 
     def _is_compiled(self, detector: Any) -> bool:
-        """Whether all parts are compiled, and a detector remembers nothing of a contact."""
+        """Whether detector and reaction are compiled, and a detector remembers nothing of a contact."""
         controller = self.controller
-        located = controller.kinds.detect == SEQUENTIAL and detector.localisation is not None
-        return PYTHON not in controller.kinds and not (controller.touching or (located and detector.localisation.steps))
+        detect, _, react = controller.kinds
+        located = detect == SEQUENTIAL and detector.localisation is not None
+        return PYTHON not in (detect, react) and not (controller.touching or (located and detector.localisation.steps))
 
     def _judge(self, inputs: Inputs) -> None:
         """Find what of the inputs can be used, and what is wrong with the rest."""

@@ -52,6 +52,12 @@ def _hints(record: type) -> dict[str, Any]:
     return get_type_hints(record, include_extras=True) if has_fields else {}
 
 
+@cache
+def _fields_at(path: str, record: type) -> list[tuple[str, str, type | None]]:
+    """Return of each field of a record at a path its name, its own path, and its class if it is a record."""
+    return [(name, f"{path}.{name}", hint if _hints(hint) else None) for name, hint in _hints(record).items()]
+
+
 class _Part(NamedTuple):
     """A record with its fields, or a field, and where the table says where it lies."""
 
@@ -129,15 +135,13 @@ class Flat:
 
     def part(self, path: str, record: type) -> Any:
         """Return a record in the record, its arrays as views, single numbers too."""
-        return record(*(
-            self.part(f"{path}.{name}", hint) if _hints(hint) else self._row(f"{path}.{name}")
-            for name, hint in _hints(record).items()
-        ))  # fmt: skip
+        fields = _fields_at(path, record)
+        return record(*[self.part(inner, kind) if kind else self._row(inner) for _, inner, kind in fields])
 
     def fill(self, path: str, value: Any) -> None:
         """Write a record in the record."""
-        for name, hint in _hints(value.__class__).items():
-            (self.fill if _hints(hint) else self.put)(f"{path}.{name}", getattr(value, name))
+        for name, inner, kind in _fields_at(path, value.__class__):
+            (self.fill if kind else self.put)(inner, getattr(value, name))
 
     def take(self, other: "Flat", names: Sequence[str]) -> None:
         """Take fields, or records with all of theirs, from another record of the same class, as far as shapes agree."""

@@ -9,6 +9,8 @@ from tests.golden.kept import close, first_difference, read, write
 from tests.golden.streams import Stream, course, run
 from tests.golden.values import selected
 
+from pretouch.decision import Decision
+
 FILE = Path(__file__).with_name("values.npz")
 """Renewed by `python -m lab.tests.baselines.test_steps`, where a baseline is meant to do something else."""
 REACHED = {
@@ -22,6 +24,18 @@ def test_steps_are_the_stored_ones(name: str) -> None:
     stored, steps = read(FILE)[f"course/{name}"], run(Stream(name, course, REACHED[name]))
     here = {i: steps[i] for i in stored}
     assert not first_difference({name: stored}, {name: here}, close, ("values.npz", "this checkout"))
+
+
+@pytest.mark.parametrize("name", ["flacco", "ding"])
+def test_a_step_in_one_call_is_the_one_that_python_decides(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = Stream(name, course, REACHED[name])
+    decided = []
+    taken = Decision.taken
+    monkeypatch.setattr(Decision, "taken", lambda own, inputs: (decided.append(1), taken(own, inputs))[1])
+    fast, count = run(stream), len(decided)
+    monkeypatch.setattr(Decision, "_is_compiled", lambda *_: False)
+    assert not first_difference({name: run(stream)}, {name: fast}, close, ("decided", "in one call"))
+    assert count < len(fast) < len(decided) - count + 1
 
 
 def test_some_thousand_steps_of_anything(monkeypatch: pytest.MonkeyPatch) -> None:
