@@ -154,14 +154,12 @@ class Controller:
             now = self.blank.copy()
             if self._usual.copied(now, inputs):
                 self.put_path(now, remembered.get("pace.phase"))
-                approach, last = state.approach, MOVE if self.approach is None else ASK
-                calm, known = self.take(memory, now, self.beside, CHECK, last), dict[str, Any]()
-                if calm and self.approach is not None:
-                    known["desired_velocity"] = now.get("request.velocity").copy()  # a restriction may add to it
-                    robot = robot_of(now.part("robot", Report))
-                    approach = move_restricted(self, self.approach, approach, memory, now, robot)
+                approach, part = state.approach, self.approach
+                calm = self.take(memory, now, self.beside, CHECK, MOVE if part is None else ASK)
+                if calm and part is not None:
+                    approach = move_restricted(self, part, approach, memory, now)
                 if calm and now.get("answer.ending") == SOLVED:
-                    return ControlStep.of(now, CLEAR, **known), ControllerState(
+                    return ControlStep.of(now, CLEAR), ControllerState(
                         memory, CLEAR, state.detector, state.reaction, approach, None, True
                     )
                 memory = remembered.copy()

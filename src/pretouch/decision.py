@@ -12,7 +12,7 @@ from pretouch.contact.virtual_mass import VirtualMass
 from pretouch.contact.window import Window, add_force
 from pretouch.control.approach import MotionRequest, Restriction, rows_of
 from pretouch.control.commander import Asked, asked_by
-from pretouch.faults import Watched, examine, put_robot
+from pretouch.faults import Watched, examine, put_robot, robot_of
 from pretouch.line import ASK, MOVE, SEE, line_points, line_within
 from pretouch.line_records import PYTHON, SEQUENTIAL
 from pretouch.modes import CLEAR, Event, QpOutcome, next_mode, outcome_of
@@ -22,7 +22,7 @@ from pretouch.perception.obstacles import silent_units, track_init
 from pretouch.records import Flat
 from pretouch.robot.kinematics import Kinematics
 from pretouch.sound import sound_desired, sound_moving, sound_payload, sound_points, sound_readings, sound_touch
-from pretouch.types import ControlStep, Inputs, Mode, Obstacles, Report, RobotState
+from pretouch.types import ControlStep, Inputs, Mode, Obstacles, Report
 
 if TYPE_CHECKING:
     from pretouch.controller import Controller, ControllerState
@@ -70,8 +70,7 @@ class Decision:
 
     def _is_compiled(self, detector: Any) -> bool:
         """Whether detector and reaction are compiled, and a detector remembers nothing of a contact."""
-        controller = self.controller
-        detect, _, react = controller.kinds
+        controller, (detect, _, react) = self.controller, self.controller.kinds
         located = detect == SEQUENTIAL and detector.localisation is not None
         return PYTHON not in (detect, react) and not (controller.touching or (located and detector.localisation.steps))
 
@@ -115,7 +114,7 @@ class Decision:
         if self.points is not None and controller.outside_places:
             blocks = controller.fixed.blocks, self.memory.blocks, now.blocks
             line_points(*blocks, self.points, controller.beside)
-        self._line(SEE)
+        controller.take(self.memory, now, self.beside, SEE, SEE)
         self.kin = kin = now.part("kin", Kinematics)
         if self.load is not None:
             self.robot, self.load = without_load(self.load, self.model, kin, robot, self.controller.limits.period)
@@ -133,15 +132,11 @@ class Decision:
         self.seen = near_of(now, "seen.found")
         if self.moving is not None:
             places = len(controller.skin) + controller.outside_places
-            self._add(near_moving(self.moving, self.model, kin, stamp, places))
+            first, near = now.get("seen.found"), near_moving(self.moving, self.model, kin, stamp, places)
+            for room, part in zip(now.part("seen.near", Obstacles), near, strict=True):
+                room[first : first + len(part)] = part
+            now.put("seen.all", first + len(near.unit))
             now.put("request.untouched", places)
-
-    def _add(self, obstacles: Obstacles) -> None:
-        """Add obstacles to those that are seen."""
-        first = self.now.get("seen.found")
-        for room, part in zip(self.now.part("seen.near", Obstacles), obstacles, strict=True):
-            room[first : first + len(part)] = part
-        self.now.put("seen.all", first + len(obstacles.unit))
 
     @property
     def _has_source(self) -> bool:
@@ -183,7 +178,7 @@ class Decision:
 
         # along the path, or as a commander asks, as fast as eqs. 3-4 leave it, or as the reaction says
         controller.put_path(now, phase)
-        self._line(ASK)
+        controller.take(memory, now, self.beside, ASK, ASK)
         scale = now.get("path.scale")
         if self.desired is None:
             asked = Asked(scale * now.get("path.velocity"), now.get("path.point"), goal, goal)
@@ -210,29 +205,25 @@ class Decision:
             now.put("request.by_joints", 1)
         approach, part = self.state.approach, controller.approach
         if part is None:
-            self._line(MOVE)
+            controller.take(self.memory, now, self.beside, MOVE, MOVE)
         else:
-            approach = move_restricted(controller, part, approach, self.memory, now, self.robot)
+            approach = move_restricted(controller, part, approach, self.memory, now)
         outcome, status, _ = outcome_of(hold, now.get("answer.ending"), bool(now.get("answer.violated")))
         if outcome in _TROUBLE and (outcome is QpOutcome.FAILED or mode.mode is not Mode.HOLD):
             self.mode = next_mode(mode, {_TROUBLE[outcome]: status}, resume=False)
             self.memory.put("pace.speed", 0.0)
         return approach
 
-    def _line(self, stage: int) -> None:
-        self.controller.take(self.memory, self.now, self.beside, stage, stage)
 
-
-def move_restricted(
-    controller: "Controller", part: Restriction, state: object, memory: Flat, now: Flat, robot: RobotState
-) -> object:
+def move_restricted(controller: "Controller", part: Restriction, state: object, memory: Flat, now: Flat) -> object:
     """Move within what a restriction in plain Python allows; return what it remembers."""
-    obstacles, request = near_of(now, "seen.all"), now.part("request", MotionRequest)
-    kin = now.part("kin", Kinematics)
+    request, kin = now.part("request", MotionRequest), now.part("kin", Kinematics)
+    robot, obstacles, asked = robot_of(now.part("robot", Report)), near_of(now, "seen.all"), request.velocity.copy()
     allowed, state = part.step(state, controller.motion_body, kin, robot, obstacles, request)
     if allowed.velocity is not None:
         request.velocity[:] += allowed.velocity
     line_within(controller.fixed.blocks, memory.blocks, now.blocks, *rows_of(allowed, controller.model.n))
+    request.velocity[:] = asked
     return state
 
 

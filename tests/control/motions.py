@@ -47,5 +47,5 @@ class Mover:
             controller.take(self.memory, now, controller.beside, MOVE, MOVE)
         else:
             part = controller.approach
-            self.approach = move_restricted(controller, part, self.approach, self.memory, now, robot)
+            self.approach = move_restricted(controller, part, self.approach, self.memory, now)
         return ControlStep.of(now, CLEAR)

@@ -11,8 +11,8 @@ from pretouch.errors import ParameterError
 from pretouch.perception.closest import closest_points
 from pretouch.profiles import profile
 from pretouch.types import Obstacles, QpOutcome, RobotState
-from pretouch_lab.baselines.ding import Ding, ding_limit, ding_rows
-from pretouch_lab.baselines.flacco import Flacco, repulsion, repulsive_velocity, slowed_joints
+from pretouch_lab.baselines.ding import Ding
+from pretouch_lab.baselines.flacco import Flacco
 
 FLACCO, DING = Flacco(), Ding()
 
@@ -27,7 +27,7 @@ def obstacles_at(points, ee=(0.0, 0.0, 0.0)):
 
 def test_repulsion_by_numbers_is_finite_anywhere():
     # at half of rho the exponent is 0; at 0 it is -6, and 1 / (1 + e^-6) = 0.99752738; at rho it is 6
-    found = repulsion(np.array([0.0, 0.2, 0.4, 1e6, -1e6]), 0.4, 6.0, 0.4)
+    found = FLACCO.v_max_m_s * FLACCO.risk(np.array([0.0, 0.2, 0.4, 1e6, -1e6]))
     np.testing.assert_allclose(found, [0.4 * 0.99752738, 0.2, 0.4 * 0.00247262, 0.0, 0.4], rtol=1e-5, atol=1e-12)
 
 
@@ -43,19 +43,19 @@ def test_repulsion_by_numbers_is_finite_anywhere():
     ids=["nothing", "one point", "the hand's size is taken off", "size of the nearest, way of both", "both sides"],
 )
 def test_the_hand_is_moved_away_from_points(points, size, expected):
-    found = repulsive_velocity(np.zeros(3), obstacles_at(points), replace(FLACCO, size_m=size))
+    found = replace(FLACCO, size_m=size).velocity(np.zeros(3), obstacles_at(points))
     np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 def test_joints_are_slowed_towards_the_obstacle_only():
-    lower, upper = slowed_joints(np.array([[0.5, -0.1, 0.0]]), np.array([0.2]), np.array([2.0, 2.0, 2.0]), FLACCO)
+    lower, upper = FLACCO.slowed(np.array([[0.5, -0.1, 0.0]]), np.array([0.2]), np.array([2.0, 2.0, 2.0]))
     np.testing.assert_allclose(upper, [1.0, 2.0, 2.0])
     np.testing.assert_allclose(lower, [-2.0, -1.0, -2.0])
 
 
 def test_of_several_points_the_strictest_limit_holds():
     motion, distance = np.array([[1.0, -1.0], [1.0, 1.0]]), np.array([0.2, 0.0])
-    lower, upper = slowed_joints(motion, distance, np.array([2.0, 2.0]), FLACCO)
+    lower, upper = FLACCO.slowed(motion, distance, np.array([2.0, 2.0]))
     left = 2.0 * (1 - 0.99752738)
     np.testing.assert_allclose(upper, [left, left], rtol=1e-5)
     np.testing.assert_allclose(lower, [-2.0, -1.0])
@@ -64,18 +64,18 @@ def test_of_several_points_the_strictest_limit_holds():
 def test_ding_limits_by_numbers():
     distance = np.array([-0.1, 0.17, 0.195, 0.22, 0.24, 0.25, 0.275, 0.2999, 0.3, 2.0])
     expected = [-0.2, -0.2, -0.1, 0.0, 0.0, 0.0, 0.1, 0.1996, np.inf, np.inf]
-    np.testing.assert_allclose(ding_limit(distance, DING), expected, atol=1e-12)
+    np.testing.assert_allclose(DING.limit(distance), expected, atol=1e-12)
 
 
 def test_ding_rows_by_numbers():
     approach = np.array([[1.0, 0.0], [0.0, 1.0]])
-    rows = ding_rows(approach, np.array([0.2, 0.5]), DING)
+    rows = DING.within(approach, np.array([0.2, 0.5]))
     assert rows.which.tolist() == [0]
     # w = 1/0.2 and 1/0.5
     np.testing.assert_allclose(rows.G, [[1.0, 0.0], [5.0 / 7.0, 2.0 / 7.0]])
     np.testing.assert_allclose(rows.h, [-0.08, 0.0])
     assert rows.weight > 0
-    near = ding_rows(approach, np.array([0.2, 0.5]), replace(DING, weighted_m=0.3))
+    near = replace(DING, weighted_m=0.3).within(approach, np.array([0.2, 0.5]))
     np.testing.assert_allclose(near.G[-1], [1.0, 0.0])
 
 
@@ -83,7 +83,7 @@ def test_ding_rows_by_numbers():
 def test_no_motion_that_ding_allows_lowers_the_weighted_sum_of_the_distances(distance, seed):
     rng = np.random.default_rng(seed)
     d = np.array(distance)
-    rows = ding_rows(rng.standard_normal((len(d), 7)), d, DING)
+    rows = DING.within(rng.standard_normal((len(d), 7)), d)
     qd = rng.standard_normal(7)
     allowed = qd - max(0.0, rows.G[-1] @ qd) / (rows.G[-1] @ rows.G[-1]) * rows.G[-1]
     C = -rows.G[-1]  # gradient of sum d_i / d_i(now)
@@ -147,7 +147,7 @@ def test_flacco_moves_the_hand_away(panda_model):
 
 def test_ding_retreats_as_fast_as_its_limit_says(panda_model):
     arm = Arm(panda_model, "ding", [0.0, 0.25, 0.0])
-    motion, limit = arm.move([0.0, 0.3, 0.0]), ding_limit(arm.obstacles.body_distance, DING)
+    motion, limit = arm.move([0.0, 0.3, 0.0]), DING.limit(arm.obstacles.body_distance)
     assert motion.qp.outcome is QpOutcome.SOLVED
     assert motion.restricted.tolist() == [0]
     np.testing.assert_allclose(motion.approach_limit, limit)

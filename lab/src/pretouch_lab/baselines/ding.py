@@ -21,10 +21,6 @@ from pretouch.types import FloatArray, Obstacles, RobotState
 _WEIGHT = 1000.0
 """Of a row's squared violation, as that of the paper's rows. The rows are soft: as hard ones, which they are in a box
 without acceleration limits, they ask an arm at rest for a retreat that no arm can have reached after one period."""
-_NEAREST_M = 0.01
-"""Least distance that weighs an obstacle [m], so that 1/d stays finite in contact."""
-_LIGHT = 1e-9
-"""Least sum of the weights [1/m]."""
 
 
 @dataclass(frozen=True)
@@ -49,12 +45,9 @@ class Ding(Restriction, name="ding"):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        p = self
-        if not p.repulse_m < p.zero_low_m <= p.zero_high_m < p.notice_m:
-            raise ParameterError(
-                "Ding.repulse_m, zero_low_m, zero_high_m, notice_m are"
-                f" {p.repulse_m}, {p.zero_low_m}, {p.zero_high_m}, {p.notice_m}: they must grow."
-            )
+        distances = self.repulse_m, self.zero_low_m, self.zero_high_m, self.notice_m
+        if not distances[0] < distances[1] <= distances[2] < distances[3]:
+            raise ParameterError(f"Ding.repulse_m, zero_low_m, zero_high_m, notice_m are {distances}: they must grow.")
 
     def step(
         self, state: None, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
@@ -63,39 +56,33 @@ class Ding(Restriction, name="ding"):
         """Return rows for the points that are near, and the one of all."""
         near = zip(obstacles.link, obstacles.body_point, obstacles.direction, strict=True)
         rows = [d @ body.model.jacobian(kin, int(link), at)[:3] for link, at, d in near]
-        return ding_rows(np.reshape(rows, (-1, body.model.n)), obstacles.body_distance, self), None
+        return self.within(np.reshape(rows, (-1, body.model.n)), obstacles.body_distance), None
+
+    def limit(self, distance: FloatArray) -> FloatArray:
+        """Largest approach (K,) [m/s] at body distances (K,) [m], infinite from `notice_m` on; negative: a retreat.
+
+        Piecewise linear: full retreat, none, neither, and the full approach at the outer end.
+        """
+        places = [self.repulse_m, self.zero_low_m, self.zero_high_m, self.notice_m]
+        limit = np.interp(distance, places, [-self.retreat_m_s, 0.0, 0.0, self.approach_m_s])
+        return np.where(distance < self.notice_m, limit, np.inf)
+
+    def within(self, rows: FloatArray, distance: FloatArray) -> Restricted:
+        """Return G qd <= h, the last row of which belongs to no point.
+
+        With C = -rows, how each distance changes with the joints, and w = 1 / d, the last is -w^T C qd <= 0: the
+        weighted sum of the distances must not fall. It is divided by the sum of w, so that its violation is a speed.
+
+        Args:
+            rows: (K, n) speed of each of K points towards its obstacle per joint velocity [m].
+            distance: (K,) of each point [m].
+        """
+        limit = self.limit(distance)
+        which, weights = np.flatnonzero(np.isfinite(limit)), (distance < self.weighted_m) / np.maximum(distance, 0.01)
+        weighted = weights @ rows / max(float(weights.sum()), 1e-9)
+        return Restricted(np.vstack([rows[which], weighted]), np.append(limit[which], 0.0), which, _WEIGHT)
 
 
-def ding_limit(distance: FloatArray, params: Ding) -> FloatArray:
-    """Largest approach (K,) [m/s] at body distances (K,) [m], infinite from `notice_m` on; negative: a retreat.
-
-    Piecewise linear: full retreat, none, neither, and the full approach at the outer end.
-    """
-    p = params
-    places = [p.repulse_m, p.zero_low_m, p.zero_high_m, p.notice_m]
-    limit = np.interp(distance, places, [-p.retreat_m_s, 0.0, 0.0, p.approach_m_s])
-    return np.where(distance < p.notice_m, limit, np.inf)
-
-
-def ding_rows(rows: FloatArray, distance: FloatArray, params: Ding) -> Restricted:
-    """Rows G qd <= h, the last of which belongs to no point.
-
-    With C = -rows, how each distance changes with the joints, and w = 1 / d, the last is -w^T C qd <= 0: the weighted
-    sum of the distances must not fall. It is divided by the sum of w, so that its violation is a speed too.
-
-    Args:
-        rows: (K, n) speed of each of K points towards its obstacle per joint velocity [m].
-        distance: (K,) of each point [m].
-        params: distances and speeds.
-    """
-    limit = ding_limit(distance, params)
-    which, seen = np.flatnonzero(np.isfinite(limit)), distance < params.weighted_m
-    weights = seen / np.maximum(distance, _NEAREST_M)
-    weighted = weights @ rows / max(float(weights.sum()), _LIGHT)
-    return Restricted(np.vstack([rows[which], weighted]), np.append(limit[which], 0.0), which, _WEIGHT)
-
-
-DING = replace(
-    profile("paper"), name="ding", slow=None, approach=Ding(), detect=MovingThresholds(f_d_n=0.0)
-)  # fmt: skip
+_DETECT = MovingThresholds(f_d_n=0.0)
+DING = replace(profile("paper"), name="ding", slow=None, approach=Ding(), detect=_DETECT)
 """The profile `ding`: contacts are detected as without proximity, and nothing else slows the arm."""

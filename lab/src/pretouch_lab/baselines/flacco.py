@@ -43,59 +43,48 @@ class Flacco(Restriction, name="flacco"):
         """Return a velocity to add and limits of the joint velocities; there are no rows."""
         model, near = body.model, zip(obstacles.link, obstacles.body_point, obstacles.direction, strict=True)
         motion = [np.linalg.pinv(model.jacobian(kin, int(link), at)[:3]) @ d for link, at, d in near]
-        speeds = slowed_joints(
-            np.reshape(motion, (-1, model.n)), obstacles.body_distance, body.limits.qd_max, self
-        )  # fmt: skip
-        velocity = repulsive_velocity(kin.position[model.ee], obstacles, self)
+        speeds = self.slowed(np.reshape(motion, (-1, model.n)), obstacles.body_distance, body.limits.qd_max)
+        velocity = self.velocity(kin.position[model.ee], obstacles)
         rows = np.zeros((0, model.n)), np.zeros(0), np.zeros(0, WHOLE)
         return Restricted(*rows, weight=1.0, velocity=velocity, speeds=speeds), None
 
+    def risk(self, distance: FloatArray) -> FloatArray:
+        """1 / (1 + exp(alpha (2 d / rho - 1))) at distances (K,) [m]: V_max times that is the repulsion."""
+        exponent = np.clip(self.alpha * (2.0 * distance / self.rho_m - 1.0), -500.0, 500.0)
+        return np.asarray(1.0 / (1.0 + np.exp(exponent)))
 
-def repulsion(distance: FloatArray, v_max: float, alpha: float, rho: float) -> FloatArray:
-    """V_max / (1 + exp(alpha (2 d / rho - 1))) [m/s] at distances (K,) [m]."""
-    exponent = np.clip(alpha * (2.0 * distance / rho - 1.0), -500.0, 500.0)
-    return np.asarray(v_max / (1.0 + np.exp(exponent)))
+    def velocity(self, position: FloatArray, obstacles: Obstacles) -> FloatArray:
+        """Velocity (3,) [m/s] that moves the end-effector's origin, at `position` (3,) [m], away from what is near.
 
+        The hybrid vector of the paper: as long as the repulsion of the nearest point, in the direction of the sum of
+        the repulsions of all.
+        """
+        if len(obstacles.unit) == 0:
+            return np.zeros(3)
+        away = position - obstacles.point
+        size = self.v_max_m_s * self.risk(np.maximum(obstacles.ee_distance - self.size_m, 0.0))
+        total = (size / np.maximum(np.linalg.norm(away, axis=1), _STILL)) @ away
+        length = float(np.linalg.norm(total))
+        return np.asarray(total * (size.max() / length)) if length > _STILL else np.zeros(3)
 
-def repulsive_velocity(position: FloatArray, obstacles: Obstacles, params: Flacco) -> FloatArray:
-    """Velocity (3,) [m/s] that moves the end-effector's origin, at `position` (3,) [m], away from what is near.
+    def slowed(self, motion: FloatArray, distance: FloatArray, qd_max: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Joint velocity limits (n,) [rad/s] by the risk f of each of K body points.
 
-    The hybrid vector of the paper: as long as the repulsion of the nearest point, in the direction of the sum of the
-    repulsions of all.
-    """
-    p = params
-    if len(obstacles.unit) == 0:
-        return np.zeros(3)
-    away = position - obstacles.point
-    far = np.linalg.norm(away, axis=1)
-    size = repulsion(np.maximum(obstacles.ee_distance - p.size_m, 0.0), p.v_max_m_s, p.alpha, p.rho_m)
-    total = (size / np.maximum(far, _STILL)) @ away
-    length = float(np.linalg.norm(total))
-    return np.asarray(total * (size.max() / length)) if length > _STILL else np.zeros(3)
+        Joints that take part in moving a point towards its obstacle may turn that way at (1 - f) of their speed. Of
+        several points the strictest limit holds.
 
-
-def slowed_joints(
-    motion: FloatArray, distance: FloatArray, qd_max: FloatArray, params: Flacco
-) -> tuple[FloatArray, FloatArray]:
-    """Joint velocity limits (n,) [rad/s] by the risk of each of K body points.
-
-    With the risk f = 1 / (1 + exp(alpha (2 d / rho - 1))), joints that take part in moving a point towards its obstacle
-    may turn that way at (1 - f) of their speed. Of several points the strictest limit holds.
-
-    Args:
-        motion: (K, n) least joint velocities that move each point towards its obstacle, and nowhere else [rad/m].
-        distance: (K,) of each point [m].
-        qd_max: (n,) [rad/s].
-        params: steepness and reach.
-    """
-    lower, upper = -qd_max, qd_max.copy()
-    for s, risk in zip(motion, repulsion(distance, 1.0, params.alpha, params.rho_m), strict=True):
-        upper = np.where(s > _STILL, np.minimum(upper, (1.0 - risk) * qd_max), upper)
-        lower = np.where(s < -_STILL, np.maximum(lower, -(1.0 - risk) * qd_max), lower)
-    return lower, upper
+        Args:
+            motion: (K, n) least joint velocities that move each point towards its obstacle, and nowhere else [rad/m].
+            distance: (K,) of each point [m].
+            qd_max: (n,) [rad/s].
+        """
+        lower, upper = -qd_max, qd_max.copy()
+        for s, risk in zip(motion, self.risk(distance), strict=True):
+            upper = np.where(s > _STILL, np.minimum(upper, (1.0 - risk) * qd_max), upper)
+            lower = np.where(s < -_STILL, np.maximum(lower, -(1.0 - risk) * qd_max), lower)
+        return lower, upper
 
 
-FLACCO = replace(
-    profile("paper"), name="flacco", slow=None, approach=Flacco(), detect=MovingThresholds(f_d_n=0.0)
-)  # fmt: skip
+_DETECT = MovingThresholds(f_d_n=0.0)
+FLACCO = replace(profile("paper"), name="flacco", slow=None, approach=Flacco(), detect=_DETECT)
 """The profile `flacco`: contacts are detected as without proximity, and nothing else slows the arm."""

@@ -182,7 +182,9 @@ def curves(free: list[Row], contacts: list[Row]) -> list[Row]:
         arms, touches = group(free, _AT_GOAL | own), group(contacts, _USUAL | own)
         hours = sum(row["hours"] for row in arms)
         for k, value in enumerate(sweep_values(contender)):
-            point: Row = own | {contender.sweep: value} | (rate([row["sweep"][k] for row in arms], hours) if hours else {})
+            point: Row = (
+                own | {contender.sweep: value} | (rate([row["sweep"][k] for row in arms], hours) if hours else {})
+            )
             for seen, name in ((True, "seen"), (False, "unseen")):
                 point[name] = delays([contact["sweep_s"][k] for contact in group(touches, {"seen": seen})])
             points.append(point)
