@@ -15,7 +15,7 @@ from pretouch.errors import ExperimentError
 from pretouch.recording.compare import DetectedContact
 from pretouch_lab.bench import real as bench
 from pretouch_lab.bench.real import halves, parted, tally, total, trial
-from pretouch_lab.bench.real_sets import SETS, Run, Stream, corrected, files_digest, sets_in, stream_of
+from pretouch_lab.bench.real_sets import SETS, RealRun, TorqueStream, corrected, files_digest, sets_in, stream_of
 
 FRANKA, UR10E, GLOVE = SETS[0], SETS[3], SETS[4]
 PUSH = (3.0, 0.5, "panda_link5", (0.0, 30.0, 0.0))
@@ -35,7 +35,7 @@ def arrays(motions, **more):
 
 
 def run_of(motion):
-    return Run(motion.time, motion.q, motion.qd, motion.driving, np.zeros(len(motion.time), np.int64), ())
+    return RealRun(motion.time, motion.q, motion.qd, motion.driving, np.zeros(len(motion.time), np.int64), ())
 
 
 @pytest.fixture(scope="module")
@@ -247,7 +247,7 @@ def test_a_folder_without_a_set_says_what_was_looked_for_and_where_it_comes_from
 
 def test_streams_keep_their_runs_apart(stream):
     some = stream.only([2, 0])
-    assert isinstance(some, Stream)
+    assert isinstance(some, TorqueStream)
     change = np.flatnonzero(np.diff(some.run))
     assert some.run[change].tolist() == [2]
     assert np.diff(some.recording.time)[change] == pytest.approx(1.0)

@@ -91,23 +91,30 @@ def plan(cell: ContactCell, hand_radius: float, warm_up_s: float | None = None) 
     The first is after a warm-up [s], the scenario file's unless another is given.
     """
     family, rng = scenario("contacts"), np.random.default_rng([cell.seed, 32])
-    chosen, kinds = family["contact"], family["contact"]["kind"]
-    every = [(k, duration) for k, kind in enumerate(kinds) for duration in kind["durations_s"]]
-    at, found = float(family["duration"]["warm_up_s"] if warm_up_s is None else warm_up_s), []
+    at, touches = float(family["duration"]["warm_up_s"] if warm_up_s is None else warm_up_s), list[Touching]()
     q = start_posture()
     for _ in range(cell.count):
-        k, duration = every[int(rng.integers(len(every)))]
-        name = chosen["links"][int(rng.integers(len(chosen["links"])))]
-        link = model().link_index(f"{model().description.name}_{name}")
-        point, normal = place_on(link, q, hand_radius, rng, family["hand"]["from_m"])
-        inwards = chosen["tilt"] * rng.uniform(-1, 1, 3) - normal
-        force = float(rng.choice(chosen["forces_n"]))
-        touch = Touching(
-            link, k, force, kinds[k]["rise_s"], duration, at, point, normal, inwards / np.linalg.norm(inwards)
-        )  # fmt: skip
-        found.append(touch)
-        at = touch.end + rng.uniform(*family["duration"]["gap_s"])
-    return found
+        touches.append(touching(family["contact"], q, at, hand_radius, rng))
+        at = touches[-1].end + rng.uniform(*family["duration"]["gap_s"])
+    return touches
+
+
+def touching(
+    chosen: dict[str, Any], q: FloatArray, at: float, hand_radius: float, rng: np.random.Generator, name: str = ""
+) -> Touching:
+    """Draw a contact that begins at a time [s], in a posture (n,) [rad], on a link of that name or on any.
+
+    `chosen` is what a scenario file has of contacts.
+    """
+    every = [(k, duration) for k, kind in enumerate(chosen["kind"]) for duration in kind["durations_s"]]
+    k, duration = every[int(rng.integers(len(every)))]
+    name = name or chosen["links"][int(rng.integers(len(chosen["links"])))]
+    link = model().link_index(f"{model().description.name}_{name}")
+    point, normal = place_on(link, q, hand_radius, rng, scenario("contacts")["hand"]["from_m"])
+    inwards = chosen["tilt"] * rng.uniform(-1, 1, 3) - normal
+    inwards /= np.linalg.norm(inwards)
+    force = float(rng.choice(chosen["forces_n"]))
+    return Touching(link, k, force, chosen["kind"][k]["rise_s"], duration, at, point, normal, inwards)
 
 
 def start_posture() -> FloatArray:

@@ -48,8 +48,6 @@ class CycleRequest:
     priority: int | None = None
     cpu: int | None = None
     """See `pretouch.realtime.real_time`."""
-    seed: int = 0
-    """Of the scene, the skin and the force noise."""
     arm: str = "panda"
     """Name of the arm, or the folder of an imported one."""
 
@@ -60,8 +58,6 @@ class CycleRequest:
             raise ExperimentError(
                 f"The rate is {self.rate_hz:g} Hz: give more than {_SLOWEST:g} and up to {_FASTEST:g} Hz."
             )
-        if self.seed < 0:
-            raise ExperimentError(f"The seed is {self.seed}: give 0 or more.")
         self.at_rate()
 
     def at_rate(self) -> Profile:
@@ -77,7 +73,7 @@ def measure(points: int, request: CycleRequest, tell: Callable[[str], None] = la
     could not be had.
     """
     model, params = RobotModel(robot_named(request.arm)), request.at_rate()
-    work, hard, paced = (Workload(model, points, params, request.seed, new) for new in (False, True, False))
+    work, hard, paced = (Workload(model, points, params, 0, new) for new in (False, True, False))
     controller, clock = (
         Controller(model, work.skin, no_fixtures(), work.path, params),
         MonotonicClock(1 / request.rate_hz),

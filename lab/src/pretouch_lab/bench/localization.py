@@ -16,7 +16,7 @@ from pretouch.robot.kinematics import Kinematics
 from pretouch.sim.plant import Plant
 from pretouch.text_table import TextTable
 from pretouch.types import FloatArray, Touched
-from pretouch_lab.bench.contacts import Toucher, Touching, described, place_on, touches_of
+from pretouch_lab.bench.contacts import Toucher, Touching, described, touches_of, touching
 from pretouch_lab.bench.motions import Wandering, WanderingController, wandering
 from pretouch_lab.bench.scenes import SeedRange, model, numbered, path_of, plant_of, scenario, sensing_of
 from pretouch_lab.bench.streams import NOTHING, PROFILE, Alone, Stream, load_stream, record, save_stream
@@ -62,28 +62,13 @@ def planned(seed: int) -> tuple[Wandering, list[Touching]]:
     """Draw an arm's motion and its contacts from a seed: with each skin they are the same."""
     family, rng = scenario("localization"), np.random.default_rng([seed, 42])
     course = wandering(seed, 2.0 * (family["duration"]["warm_up_s"] + 3.6 * family["contact"]["number"]))
-    touches: list[Touching] = []
-    at = float(family["duration"]["warm_up_s"])
-    for number in range(family["contact"]["number"]):
-        touches.append(_drawn(course, at, number, rng))
+    radius, touches = sensing_of("nominal", 0).hand_radius, list[Touching]()
+    at, links = float(family["duration"]["warm_up_s"]), family["contact"]["links"]
+    for number in range(family["contact"]["number"]):  # links take turns, so that all are touched as often
+        name = links[number % len(links)]
+        touches.append(touching(family["contact"], course.at(at)[0], at, radius, rng, name))
         at = touches[-1].end + rng.uniform(*family["duration"]["gap_s"])
     return course, touches
-
-
-def _drawn(course: Wandering, at: float, number: int, rng: np.random.Generator) -> Touching:
-    """Draw a contact that begins at a time [s]; links take turns, so that all are touched as often."""
-    family, arm = scenario("localization"), model()
-    chosen, hand = family["contact"], scenario("contacts")["hand"]
-    radius = sensing_of("nominal", 0).hand_radius
-    every = [(k, duration) for k, kind in enumerate(chosen["kind"]) for duration in kind["durations_s"]]
-    k, duration = every[int(rng.integers(len(every)))]
-    name = chosen["links"][number % len(chosen["links"])]
-    link = arm.link_index(f"{arm.description.name}_{name}")
-    point, normal = place_on(link, course.at(at)[0], radius, rng, hand["from_m"])
-    inwards = chosen["tilt"] * rng.uniform(-1, 1, 3) - normal
-    force = float(rng.choice(chosen["forces_n"]))
-    inwards /= np.linalg.norm(inwards)
-    return Touching(link, k, force, chosen["kind"][k]["rise_s"], duration, at, point, normal, inwards)
 
 
 def record_stream(out: Path, cell: Cell, seed: int) -> Row:

@@ -16,7 +16,7 @@ from pretouch.recording.compare import DetectedContact
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.text_table import TextTable
-from pretouch_lab.bench.real_sets import SETS, Run, Stream, corrected, stream_of
+from pretouch_lab.bench.real_sets import SETS, RealRun, TorqueStream, corrected, stream_of
 from pretouch_lab.run import Cell, Row
 from pretouch_lab.table import Column, rate_bounds, table
 
@@ -49,29 +49,29 @@ def trial(folder: Path, cell: Cell, _seed: int) -> Row:
 
 
 @lru_cache(maxsize=1)
-def _prepared(folder: Path, name: str) -> tuple[list[Run], Stream]:
+def _prepared(folder: Path, name: str) -> tuple[list[RealRun], TorqueStream]:
     real = next(each for each in SETS if each.name == name)
     runs = parted(real.read(real.files(folder)))
     return runs, stream_of(real, runs, RobotModel(robot_named(real.arm_of(folder))))
 
 
-def parted(runs: list[Run]) -> list[Run]:
+def parted(runs: list[RealRun]) -> list[RealRun]:
     """Cut a single recording in the middle, so that there are two: nothing else could be judged apart."""
     if len(runs) > 1:
         return runs
     (r,), middle = runs, len(runs[0].time) // 2
     parts = (slice(middle), slice(middle, None))
-    return [Run(r.time[part], r.q[part], r.qd[part], r.torque[part], r.label[part], r.joints) for part in parts]
+    return [RealRun(r.time[part], r.q[part], r.qd[part], r.torque[part], r.label[part], r.joints) for part in parts]
 
 
 def tally(
-    stream: Stream,
+    stream: TorqueStream,
     alarms: Sequence[DetectedContact],
     course: Course,
     judged: Sequence[int],
     joints: Sequence[tuple[int, ...]],
 ) -> Row:
-    """Count over some runs of a stream what `total` adds up; `joints` of each run of the set are as in `Run`.
+    """Count over some runs of a stream what `total` adds up; `joints` of each run of the set are as in `RealRun`.
 
     A contact is `busy` that began during an alarm of before: it is neither found nor missed. Links count of contacts
     on a link that the set names, by a detector that names one.
@@ -121,7 +121,7 @@ def total(counts: Sequence[Row]) -> Row:
     }
 
 
-def _spans(stream: Stream) -> list[tuple[int, int, int]]:
+def _spans(stream: TorqueStream) -> list[tuple[int, int, int]]:
     """Stretches that are not sure to be free: first sample, first in a contact (-1: none), last sample."""
     label, time, run = stream.label, stream.recording.time, stream.run
     some = np.flatnonzero(label)

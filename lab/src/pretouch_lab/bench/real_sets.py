@@ -31,7 +31,7 @@ _SHARED_NM = 1e-9
 
 
 @value
-class Run:
+class RealRun:
     """One recording: N samples of n joints, in the order of time."""
 
     time: FloatArray
@@ -63,7 +63,7 @@ class RealSet:
     place: str
     """Its files under the folder of all sets, as a pattern."""
     source: str
-    read: Callable[[list[Path]], list[Run]]
+    read: Callable[[list[Path]], list[RealRun]]
     of_currents: bool = False
     """Whether motor currents were measured, with the friction of the gears in them."""
 
@@ -82,7 +82,7 @@ _GLOVE = ("time", *(f"{name}{joint}" for name in ("q", "dq", "tau_J") for joint 
 """Columns that are read; joints count from 0."""
 
 
-def _of_arrays(files: list[Path]) -> list[Run]:
+def _of_arrays(files: list[Path]) -> list[RealRun]:
     """Read a file of NumPy arrays t, q, dq, tau and run, with label, ok and run_name where it has them."""
     try:
         with np.load(files[0], allow_pickle=False) as stored:
@@ -101,7 +101,7 @@ def _of_arrays(files: list[Path]) -> list[Run]:
     return runs
 
 
-def _of_glove(files: list[Path]) -> list[Run]:
+def _of_glove(files: list[Path]) -> list[RealRun]:
     """Read tables of contactInterpretation, one a contact place and motion, in a folder for each link.
 
     The measured torques `tau_J` go through our own observer. The file's external ones, `tau_ext`, are not used: nothing
@@ -120,13 +120,13 @@ def _of_glove(files: list[Path]) -> list[Run]:
     return runs
 
 
-def _run(parts: list[FloatArray], label: FloatArray, joints: tuple[int, ...]) -> Run:
+def _run(parts: list[FloatArray], label: FloatArray, joints: tuple[int, ...]) -> RealRun:
     """Leave out what is not finite, and samples that are not later than those before."""
     time, q, qd, torque = (np.asarray(part, np.float64) for part in parts)
     finite = np.isfinite(np.column_stack([time, q, qd, torque])).all(axis=1)
     latest = np.maximum.accumulate(np.where(finite, time, -np.inf))
     usable = finite & np.append(np.True_, time[1:] > latest[:-1])
-    return Run(time[usable], q[usable], qd[usable], torque[usable], label[usable].astype(np.int64), joints)
+    return RealRun(time[usable], q[usable], qd[usable], torque[usable], label[usable].astype(np.int64), joints)
 
 
 SETS = (
@@ -176,23 +176,23 @@ def files_digest(sets: Sequence[RealSet], folder: Path) -> str:
 
 
 @value
-class Stream:
+class TorqueStream:
     """Runs one after the other as one recording. M samples of n joints."""
 
     recording: TorqueRecording
     label: IntArray
-    """(M,) as of `Run`."""
+    """(M,) as of `RealRun`."""
     run: IntArray
     """(M,) which run a sample is of, as its number in the set."""
     load: FloatArray
     """(M, n) what a mass of 1 kg at the end-effector changes of the external torques [Nm]."""
 
-    def only(self, runs: Sequence[int]) -> "Stream":
+    def only(self, runs: Sequence[int]) -> "TorqueStream":
         """Return some runs, in this order."""
         r, parts = self.recording, [np.flatnonzero(self.run == number) for number in runs]
         at, time = np.concatenate(parts), _laid([r.time[part] for part in parts])
         some = {name: getattr(r, name)[at] for name in ("q", "qd", "qd_commanded", "tau_ext")}
-        return Stream(replace(r, time=time, **some), self.label[at], self.run[at], self.load[at])
+        return TorqueStream(replace(r, time=time, **some), self.label[at], self.run[at], self.load[at])
 
 
 def _laid(times: Sequence[FloatArray]) -> FloatArray:
@@ -204,7 +204,7 @@ def _laid(times: Sequence[FloatArray]) -> FloatArray:
     return np.concatenate(laid)
 
 
-def stream_of(real: RealSet, runs: Sequence[Run], model: RobotModel) -> Stream:
+def stream_of(real: RealSet, runs: Sequence[RealRun], model: RobotModel) -> TorqueStream:
     """Bring all runs of a set to external torques, as `pretouch detect` does."""
     kind, gains = ("current", (1.0,) * model.n) if real.of_currents else ("tau", ())
     arrays = {"q": [r.q for r in runs], "dq": [r.qd for r in runs], kind: [r.torque for r in runs]}
@@ -215,10 +215,10 @@ def stream_of(real: RealSet, runs: Sequence[Run], model: RobotModel) -> Stream:
     )
     loaded = observed(model, r.time, r.q, r.qd, joints[kind], SequentialParams().observer_gain_1_s, 1.0)
     numbers = np.repeat(np.arange(len(runs)), [len(run.time) for run in runs])
-    return Stream(r, np.concatenate([run.label for run in runs]), numbers, loaded - r.tau_ext)
+    return TorqueStream(r, np.concatenate([run.label for run in runs]), numbers, loaded - r.tau_ext)
 
 
-def corrected(stream: Stream, learnt: Sequence[int]) -> Stream:
+def corrected(stream: TorqueStream, learnt: Sequence[int]) -> TorqueStream:
     """Take away what the free motion of some runs tells of load, offsets and friction.
 
     One mass at the end-effector, and for each joint an offset, viscous and Coulomb friction, by least squares. The

@@ -26,16 +26,12 @@ _ROOM_CENTER, _ROOM_RADIUS = np.array([0.25, 0.0, 0.45]), 1.0
 """The Panda's room is round, and as wide as the arm can reach [m]: every beam ends at a sphere or at its wall."""
 _CLEAR = 0.3, 0.5
 """Nearest and farthest a sphere's surface lies from the arm at the start [m]: much nearer, eq. 6 lets nothing move."""
-_HAND = 0.1
-"""Reach of the hand round its origin [m]."""
-_CIRCLE = 0.1
-"""Radius of the path [m]."""
+_HAND, _CIRCLE = 0.1, 0.1
+"""Reach of the hand round its origin, and radius of the path [m]."""
 _JOINTS_BEFORE = 2
 """Joints that move the first link with units."""
-_ABOVE = 0.006
-"""Height of a unit above its link [m]."""
-_SEEN = 0.55
-"""Largest first reading of a unit [m]: within d_notice of Table I."""
+_ABOVE, _SEEN = 0.006, 0.55
+"""Height of a unit above its link, and its largest first reading [m]: within d_notice of Table I."""
 _FORCE_NOISE, _DRAWS = 0.3, 4096
 """Standard deviation of the force estimate [N], and its samples before they repeat."""
 _IN_VAIN, _TRIES = 20, 40
@@ -89,11 +85,6 @@ class Workload:
     def move(self, qd: FloatArray) -> None:
         """Let one cycle pass with joint velocities (n,) [rad/s]."""
         self._q, self._qd, self._cycle = self._q + qd * self._period, qd, self._cycle + 1
-
-    def clearance(self) -> float:
-        """Distance from the arm to the nearest sphere [m]."""
-        body = placed(self._model.capsules, self._model.kinematics(self._q))
-        return float(_distance(self.spheres, body).min()) - _SPHERE_RADIUS
 
     def _ranges(self, origin: FloatArray, beam: FloatArray) -> FloatArray:
         """Distance (k,) [m] along rays (k, 3) to the nearest sphere, or from within to the room's wall."""
