@@ -120,13 +120,6 @@ def test_the_whole_step_tracks_with_as_many_units_that_see_something(points: int
     np.testing.assert_array_equal([whole.solve(s) for s in range(SNAPSHOTS)], [step.command for step in steps])
 
 
-def test_it_is_drawn_from_its_seed_alone(problem: Problem):
-    again, other = (generate(*panda_arm(), SNAPSHOTS, POINTS, seed=seed) for seed in (3, 4))
-    np.testing.assert_array_equal(again.points, problem.points)
-    np.testing.assert_array_equal(again.velocity, problem.velocity)
-    assert not np.any(other.points == problem.points)
-
-
 def test_a_file_holds_all_of_it(problem: Problem, tmp_path: Path):
     problem.save(tmp_path / "problem.npz")
     read = load(tmp_path / "problem.npz")

@@ -16,15 +16,15 @@ import select
 import socket
 import sys
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from pretouch.units.keys import Keys, UnitKey, new_key
 from pretouch.units.skin import NetworkSkin
-from pretouch.units.unit import Received
 from pretouch.units.wire import Mac
 from tests.units.fake_unit import PLAIN, FakeUnit
 
@@ -90,8 +90,7 @@ def flood(kind: str, rate: float, keys: Keys, address: Address, stop, sent) -> N
             time.sleep(0.0002)
 
 
-@dataclass
-class Outcome:
+class Outcome(NamedTuple):
     """What was measured in one run."""
 
     cpu: float
@@ -115,13 +114,18 @@ def measure(duration: float, keys: Keys, kind: str | None, priority: int | None,
     with NetworkSkin(tuple(keys), keys) as skin:
         if priority is not None:
             os.sched_setscheduler(skin.pid, os.SCHED_FIFO, os.sched_param(priority))
-        others = [context.Process(target=send_samples, args=(keys, skin.address, stop), daemon=True)]
-        if kind:
-            others.append(context.Process(target=flood, args=(kind, rate, keys, skin.address, stop, sent), daemon=True))
+        asked = [(send_samples, (keys, skin.address, stop))]
+        asked += [(flood, (kind, rate, keys, skin.address, stop, sent))] if kind else []
+        others = [context.Process(target=target, args=args, daemon=True) for target, args in asked]
         for process in others:
             process.start()
         try:
-            return _watch(skin, sent, duration) if _all_heard(skin, kind is None, sent) else None
+            until = time.monotonic() + LONGEST_START_S
+            while any(unit.state != "live" for unit in skin.traffic().units) or (kind and not sent.value):
+                if time.monotonic() > until:
+                    return None
+                time.sleep(0.05)
+            return _watch(skin, sent, duration)
         finally:
             stop.set()
             for process in others:
@@ -129,20 +133,10 @@ def measure(duration: float, keys: Keys, kind: str | None, priority: int | None,
                 process.kill()
 
 
-def _all_heard(skin: NetworkSkin, calm: bool, sent) -> bool:
-    """Wait for all units, and for the flood if there is one."""
-    until = time.monotonic() + LONGEST_START_S
-    while any(unit.state != "live" for unit in skin.traffic().units) or not (calm or sent.value):
-        if time.monotonic() > until:
-            return False
-        time.sleep(0.05)
-    return True
-
-
 def _watch(skin: NetworkSkin, sent, duration: float) -> Outcome:
     time.sleep(1.0)
     skin.take_samples()
-    before, flooded, begin, received = _cpu_s(skin.pid), sent.value, time.monotonic(), list[Received]()
+    before, flooded, begin, received = _cpu_s(skin.pid), sent.value, time.monotonic(), []
     while time.monotonic() < begin + duration:
         time.sleep(0.1)
         received += skin.take_samples()
@@ -161,19 +155,16 @@ def _cpu_s(pid: int) -> float:
 def main(duration: float = 10.0, count: int = 40, priority: int | None = None) -> None:
     """Measure, print."""
     keys = Keys(UnitKey(f"unit {k + 1}", k + 1, new_key()) for k in range(count))
-    print(f"{count} units, {RATE:g} samples a second each, {duration:g} s each;", end=" ")
-    print(f"{os.cpu_count()} processors, load before of {os.getloadavg()[0]:.1f}", flush=True)
+    print(f"{count} units, {os.cpu_count()} processors, load before of {os.getloadavg()[0]:.1f}", flush=True)
     for kind in KINDS:
         seen = measure(duration, keys, kind, priority)
         if seen is None:
             print(f"{kind or 'no flood':9s} not all units were heard within {LONGEST_START_S:g} s", flush=True)
             continue
-        each = f", {1e6 * seen.cpu * duration / seen.accepted:.1f} us a sample" if kind is None else ""
-        late = 1e3 * np.percentile(seen.lateness, (50, 99, 100))
+        late = " / ".join(f"{ms:.2f}" for ms in 1e3 * np.percentile(seen.lateness, (50, 99, 100)))
         print(
-            f"{kind or 'no flood':9s} {seen.flooded:7.0f}/s: {100 * seen.cpu:5.1f} % of a core{each};"
-            f" {100 * seen.lost:.3f} % of {seen.accepted} lost;"
-            f" late by {late[0]:.2f} ms (50 %), {late[1]:.2f} ms (99 %), {late[2]:.2f} ms (most)",
+            f"{kind or 'no flood':9s} {seen.flooded:7.0f}/s: {100 * seen.cpu:5.1f} % of a core;"
+            f" {100 * seen.lost:.3f} % of {seen.accepted} lost; late by {late} ms (50 % / 99 % / most)",
             flush=True,
         )
 
