@@ -133,7 +133,7 @@ def test_slow_steps_are_overruns_in_wall_time_alone(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(cycle, "warm_up", lambda *_given: None)
     row = measure(2, CycleRequest(rate_hz=25.0, cycles=10))
     assert row["overruns"] >= 2
-    assert row["wall_max_us"] >= 100_000
+    assert 100_000 <= row["wall_max_us"] < 5_000_000
     assert row["median_us"] < 100_000
     assert row["missed_ticks"] >= 1
 

@@ -153,18 +153,15 @@ def about(request: CycleRequest) -> Row:
         "versions": {name: version(name) for name in _PACKAGES},
         "processor": processor(),
         "processors": os.cpu_count(),
-        "system": f"{platform.system()} {platform.release()}",
+        "system": platform.platform(),
     }
 
 
 def processor() -> str:
     """Name the processor of this machine."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
+    lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return models[0] if models else platform.processor() or platform.machine()
+    return models[0] if models else platform.machine()
 
 
 _COLUMNS = (

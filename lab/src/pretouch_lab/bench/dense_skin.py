@@ -19,7 +19,8 @@ _HEIGHT_M = 0.008
 """Height of a range finder above the surface [m]."""
 _CLEAR_M = (0.05, 0.1, 0.2, 0.3)
 """Places along a beam [m] that have to lie outside the rest of the arm, in the ready posture."""
-_TURNS, _PLACES = 24, 7
+_TURNS, _PARTS = 2 * np.pi * np.arange(24) / 24, np.linspace(0.0, 1.0, 7)
+"""Of places on a capsule: round its axis [rad], and along it."""
 
 
 def surface(a: FloatArray, b: FloatArray, turn: float, part: float) -> tuple[FloatArray, FloatArray]:
@@ -80,8 +81,7 @@ def _candidates(model: RobotModel, link: int) -> tuple[FloatArray, FloatArray]:
     kin, arm = model.kinematics(model.description.q_ready), model.capsules
     _, a, b, _ = placed(arm, kin)
     places, normals = [], []
-    turns, parts = 2 * np.pi * np.arange(_TURNS) / _TURNS, np.linspace(0.0, 1.0, _PLACES)
-    for c, turn, part in product(np.flatnonzero(arm.link == link), turns, parts):
+    for c, turn, part in product(np.flatnonzero(arm.link == link), _TURNS, _PARTS):
         foot, normal = surface(arm.a[c], arm.b[c], turn, part)
         place = foot + (arm.radius[c] + _HEIGHT_M) * normal
         ahead = place + np.outer((0.0, *_CLEAR_M), normal)

@@ -28,7 +28,6 @@ _TAIL_S = 0.6
 """Time after the last contact [s]."""
 SKINS = {"nominal": "32 units", "seven": "seven", "misplaced": "32 units, misplaced"}
 """What the kinds of sensing are called."""
-JUDGED = "pretouch"
 WITHOUT = ("none", "none, nothing learnt")
 """Skins of which there is no stream: that of 32 units is replayed as if it saw nothing. Free motion is learnt in the
 warm-up, in which somebody sees to it that nobody is near, or not at all."""
@@ -109,7 +108,7 @@ def trial(out: Path, cell: Cell, seed: int) -> Row:
 
     Each contact is judged twice: some time after it began, and at its end, by the last step not later than that.
     """
-    params, arm, blind = profile(JUDGED), model(), cell["skin"] in WITHOUT
+    params, arm, blind = profile("pretouch"), model(), cell["skin"] in WITHOUT
     stream = _stream(out, cell["sensing"], seed)
     touches, detector = touches_of(stream), DetectorAlone(params, arm)
     learning_s = scenario("localization")["duration"]["warm_up_s"] - 1.0

@@ -20,7 +20,6 @@ from pretouch_lab.bench.real_sets import SETS, RealRun, TorqueStream, corrected,
 from pretouch_lab.run import Cell, Row
 from pretouch_lab.table import Column, rate_bounds, table
 
-DETECTORS = ("fixed", "observer", "paper", "pretouch")
 _AFTER_S = 0.1
 """Time after a contact in which an alarm still counts as of it, and none as false [s]."""
 _NEAR_S = 0.5
