@@ -2,15 +2,16 @@
 
 from collections import Counter
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
-from pretouch_lab.bench import hard, scenes
+from pretouch_lab.bench import hard
 from pretouch_lab.bench.contenders import DETECTORS
 from pretouch_lab.bench.detection_results import HARD, UNTOLD, arms_of, hard_rows
 from pretouch_lab.bench.hard import HardCell, hard_cells, hard_stream
-from pretouch_lab.bench.motions import motion_of
+from pretouch_lab.bench.motions import WanderingController, motion_of
 from pretouch_lab.bench.scenes import model, scenario
 from pretouch_lab.bench.streams import record
 
@@ -47,17 +48,24 @@ def test_a_hard_motion_is_within_the_limits_and_as_fast_as_it_says(name):
 
 
 @pytest.mark.slow
-def test_hard_arms_that_nobody_is_near_move_alike_without_units_and_controller(monkeypatch):
-    cell = HardCell("pick-and-place", "nothing", 1003, 1.0)
-    alone = hard_stream(cell, True)
-    assert alone.stamp[-1] == pytest.approx(61.0, abs=0.05)
-    sensing = scenes.sensing_of("nominal", cell.seed)
-    monkeypatch.setattr(hard, "record_moved", lambda what, prepare, _: record(replace(what, sensing=sensing), prepare))
-    seen = hard_stream(cell, True)
-    for name, numbers in alone.robot.items():
-        np.testing.assert_array_equal(numbers, seen.robot[name])
-    assert not seen.count.any()
-    assert hard_stream(replace(cell, near="standing"), True).count.any()
+def test_a_hard_arm_moves_and_sees_without_a_controller_as_with_one(monkeypatch):
+    cell = HardCell("pick-and-place", "standing", 1003, 1.0)
+    made, alone = hard_stream(cell, True), hard_stream(replace(cell, near="nothing"), True)
+    assert made.stamp[-1] == pytest.approx(61.0, abs=0.05)
+
+    def by_controller(what, prepare, command):
+        return record(replace(what, controller=partial(WanderingController, command.__self__)), prepare)
+
+    monkeypatch.setattr(hard, "record_moved", by_controller)
+    controlled = hard_stream(cell, True)
+    assert made.count.max() > 0
+    np.testing.assert_array_equal(made.watched, controlled.watched)
+    np.testing.assert_array_equal(made.count, controlled.count)
+    for part in ("robot", "obstacles"):
+        for name, numbers in getattr(controlled, part).items():
+            np.testing.assert_array_equal(getattr(made, part)[name], numbers)
+    for name, numbers in alone.robot.items():  # nobody near, no units
+        np.testing.assert_array_equal(numbers, made.robot[name])
 
 
 def test_rows_are_by_motion_and_loads_that_nobody_announced_are_apart():

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -13,9 +12,9 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.types import FloatArray
 from pretouch_lab.bench.contacts import Toucher, Touching, described, place_on
 from pretouch_lab.bench.dense_skin import gap
-from pretouch_lab.bench.motions import Motion, WanderingController, motion_of
+from pretouch_lab.bench.motions import Motion, motion_of
 from pretouch_lab.bench.scenes import SeedRange, model, numbered, path_of, scenario, sensing_of
-from pretouch_lab.bench.streams import AWAY, PROFILE, Alone, Stream, record, record_moved
+from pretouch_lab.bench.streams import AWAY, PROFILE, Alone, Stream, record_moved
 from pretouch_lab.replay import Place
 
 WORLD = "hard"
@@ -71,7 +70,7 @@ def hard_stream(cell: HardCell, quick: bool) -> Stream:
         path_of("rest"), profile(PROFILE).task.speed_m_s, PlantParams(), None if cell.near == "nothing" else sensing,
         sensing.hand_radius if touches else family["near"]["radius_m"], cell.seed,
         touches[-1].end + scenario("contacts")["judged"]["late_s"] + 0.1 if touches else start + cell.counted_s, WORLD,
-        motion.course.at(0.0)[0], partial(WanderingController, motion.course),
+        motion.course.at(0.0)[0],
     )  # fmt: skip
 
     def prepare(plant: Plant) -> Place:
@@ -80,7 +79,7 @@ def hard_stream(cell: HardCell, quick: bool) -> Stream:
             return Toucher(plant, touches, sensing.hand_radius).hand
         return _beside(motion, cell.seed) if cell.near == "standing" else AWAY
 
-    stream = record(what, prepare) if what.sensing else record_moved(what, prepare, motion.course.command)
+    stream = record_moved(what, prepare, motion.course.command)
     return replace(stream, truth=described(touches, sensing.hand_radius) if touches else {})
 
 

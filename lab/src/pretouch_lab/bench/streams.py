@@ -14,7 +14,9 @@ import numpy as np
 from pretouch.atomic_write import atomic_replacement
 from pretouch.control.path import Path as TaskPath
 from pretouch.controller import Controller
-from pretouch.loop import Cycle
+from pretouch.line import SEE
+from pretouch.loop import Cycle, instant
+from pretouch.modes import CLEAR
 from pretouch.params import TaskParams
 from pretouch.profiles import profile
 from pretouch.sensing.skin import Skin
@@ -22,7 +24,7 @@ from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import GhostSpec, SceneSpec
-from pretouch.types import FloatArray, IntArray, Mode, Obstacles, RobotState, no_obstacles
+from pretouch.types import ControlStep, FloatArray, IntArray, Mode, Obstacles, RobotState, no_obstacles
 from pretouch_lab.bench.scenes import Sensing, model
 from pretouch_lab.replay import Ghost, Place
 from pretouch_lab.trial import Setup, Simulation
@@ -93,18 +95,23 @@ class StreamRecorder:
 
     def record(self, cycle: Cycle) -> None:
         """Keep one turn of the loop."""
-        self._plant.take_log()
         memory = cycle.after.memory
         # the fields of the state that was believed lie one behind the other: one copy, for a look-up costs as much
         begin, end = (memory.places[f"watch.robot.{name}"].at for name in ("stamp", "wrench"))
-        self._robot.append(memory.blocks[0][begin.start : end.stop].copy())
-        near = cycle.step.obstacles
-        self._obstacles.append(near if len(near.unit) else NOTHING)
-        heard = memory.get("tracks.heard")
-        watched = cycle.step.stamp - float(heard.min(initial=np.inf)) <= self._patience
-        self._flags.append((cycle.before.mode.mode is Mode.REACT, watched))
+        robot = memory.blocks[0][begin.start : end.stop].copy()
+        reacting = cycle.before.mode.mode is Mode.REACT
+        self.add(robot, cycle.step.obstacles, cycle.step.stamp, memory.get("tracks.heard"), reacting)
         if self._look:
             self._look(cycle)
+
+    def add(
+        self, robot: FloatArray, near: Obstacles, stamp: float, heard: FloatArray, reacting: bool = False
+    ) -> None:  # fmt: skip
+        """Keep the state of the robot, its fields one behind the other, what is near, and when each unit was heard."""
+        self._plant.take_log()
+        self._robot.append(robot)
+        self._obstacles.append(near if len(near.unit) else NOTHING)
+        self._flags.append((reacting, stamp - float(heard.min(initial=np.inf)) <= self._patience))
 
     def stream(self, truth: dict[str, FloatArray] | None = None) -> Stream:
         """Return all that was kept."""
@@ -209,20 +216,29 @@ def record(what: Alone, prepare: Prepare, look: Callable[[Plant, Ghost, Cycle], 
 
 
 def record_moved(what: Alone, prepare: Prepare, command: Callable[[float, FloatArray], FloatArray]) -> Stream:
-    """Let an arm without units run with no controller, a quarter of the time, and return its stream.
+    """Let an arm that no controller moves run until its end, and return its stream: half the time, without units less.
 
-    `command(time, q_commanded)` is its joint velocities (n,) [rad/s] at a time [s], given (n,) [rad].
+    `command(time, q_commanded)` is its joint velocities (n,) [rad/s] at a time [s], given (n,) [rad]. Of the controller
+    there is perception alone.
     """
     simulation = what.simulation(lambda plant, _: Ghost(plant, prepare(plant)))
-    plant, rows, stamp = simulation.plant, list[FloatArray](), -np.inf
-    plant.read()  # as a controller does before its first step: each reading is of another delay
+    plant, controller, recorder = simulation.plant, simulation.controller, StreamRecorder(simulation.plant)
+    memory, stamp = controller.init(plant.read()).memory, -np.inf
     while not what.is_over(stamp):
-        tick, state = simulation.clock.tick(), plant.read()
-        stamp = max(tick, state.stamp)
+        tick, state, readings = simulation.clock.tick(), plant.read(), simulation.skin.read()
+        stamp = instant(tick, controller.limits.period, state, readings, None)
         plant.command(command(stamp, state.q_commanded))
-        plant.take_log()
         wrench = np.full(6, np.nan) if state.wrench is None else state.wrench
         parts = (state.q, state.qd, state.q_commanded, state.qd_commanded, state.tau_ext, wrench)
-        rows.append(np.concatenate(((state.stamp,), *parts)))
-    steps, nothing = len(rows), {name: getattr(NOTHING, name) for name in _OBSTACLES}
-    return Stream(_fields_of(rows), np.zeros(steps), np.ones(steps), np.zeros(steps, np.int64), nothing)
+        near, heard = NOTHING, np.zeros(0)
+        if what.sensing:
+            now = controller.blank.copy()
+            for name in ("stamp", "distance", "status"):
+                now.put(f"readings.{name}", getattr(readings, name))
+            for name in ("stamp", "q", "qd"):
+                now.put(f"robot.{name}", getattr(state, name))
+            now.put("stamp", stamp)
+            controller.take(memory, now, controller.beside, SEE, SEE)
+            near, heard = ControlStep.of(now, CLEAR).obstacles, memory.get("tracks.heard")
+        recorder.add(np.concatenate(((state.stamp,), *parts)), near, stamp, heard)
+    return recorder.stream()
