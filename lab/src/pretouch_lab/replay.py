@@ -46,7 +46,10 @@ class DetectorAlone:
 
 
 class FirstMotion:
-    """How an arm would begin to move with what a detector takes for a contact, in a stream that went on without."""
+    """How an arm would begin to move with what a detector takes for a contact, in a stream that went on without.
+
+    That is for reactions in joint space, which learn in free motion and may begin late.
+    """
 
     def __init__(self, model: RobotModel, profile: Profile, q: FloatArray, rest: int) -> None:
         """Take the arm, its profile, first joint positions (n,) [rad], and the steps of an answer."""
@@ -58,9 +61,7 @@ class FirstMotion:
     def step(self, kin: Kinematics, robot: RobotState, found: Detection, near: Obstacles) -> FloatArray | None:
         """Take a step in; return the joint velocities (n,) [rad/s] with which an answer begins to move, else None.
 
-        That may be later than the alarm, for static friction holds an arm until the push is strong enough. An answer
-        that is a velocity of the end-effector (eq. 12) is taken to be made by the least joint velocities that have it,
-        as eq. 2 does far from limits and singularities.
+        That may be later than the alarm, for static friction holds an arm until the push is strong enough.
         """
         mode = _REACT if self._left else _TRACK
         given = ReactionInputs(mode, kin, robot, found, near, False, robot.qd_commanded, 0.0, False, self._mass)
@@ -73,12 +74,10 @@ class FirstMotion:
         if self._moves:
             return None
         answer, self._state = self._react.move(self._state, self._body, given, _REACT)
-        if answer is None:
+        if answer is None or answer.qd is None:
             return None
-        least = np.linalg.pinv(self._body.model.ee_jacobian(kin)[:3])
-        qd = np.asarray(least @ answer.velocity) if answer.qd is None else answer.qd
-        self._moves = bool(qd.any())
-        return qd if self._moves else None
+        self._moves = bool(answer.qd.any())
+        return answer.qd if self._moves else None
 
 
 Place = FloatArray | Callable[[float], FloatArray]

@@ -30,7 +30,7 @@ from pretouch_lab.bench.detection_tables import reached, tables
 from pretouch_lab.bench.free import FreeCell, free_cells, free_stream
 from pretouch_lab.bench.hard import hard_cells
 from pretouch_lab.bench.replays import REST, Steps, alarms_of, begun
-from pretouch_lab.bench.scenes import model, sensing_of
+from pretouch_lab.bench.scenes import model
 from pretouch_lab.bench.streams import AWAY, StreamRecorder, load_stream, save_stream
 from pretouch_lab.replay import DetectorAlone, FirstMotion, Ghost
 
@@ -270,7 +270,8 @@ def test_every_baseline_is_a_profile_with_its_own_value_on_its_curve():
 
 
 def test_a_run_leaves_rows_for_every_detector(monkeypatch):
-    monkeypatch.setattr(detection, "warm_up_s", lambda: 1.5)
+    for module in (detection, free_motion):
+        monkeypatch.setattr(module, "warm_up_s", lambda: 1.5)
     free, seven = (
         FreeCell("nominal", "circle", 0.3, "standing", 1000, 1.0),
         ContactCell("nominal", "seven", 0.3, 1000, 1),
@@ -295,9 +296,10 @@ def test_a_run_leaves_rows_for_every_detector(monkeypatch):
 
 def test_arms_that_nobody_is_near_move_alike_without_units(monkeypatch):
     free = FreeCell("nominal", "circle", 0.3, "nothing", 1000, 1.0)
-    made = free_stream(free, PlantParams(), sensing_of("seven", 1000), 0.0)
+    monkeypatch.setattr(free_motion, "warm_up_s", lambda: 0.0)
+    made = free_stream(free)
     monkeypatch.setattr(free_motion, "_bystander", lambda _: lambda _: AWAY)
-    seen = free_stream(replace(free, near="standing"), PlantParams(), sensing_of("seven", 1000), 0.0)
+    seen = free_stream(replace(free, near="standing"))
     assert not seen.count.any()
     np.testing.assert_array_equal(made.watched, seen.watched)
     for name, numbers in made.robot.items():

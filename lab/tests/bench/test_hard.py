@@ -40,9 +40,9 @@ def test_a_hard_motion_is_within_the_limits_and_as_fast_as_it_says(name):
     if motion.loads:
         fastest = np.linalg.norm(np.diff(hand, axis=0), axis=1).max() / 0.05
         assert 0.7 < fastest < 1.1
-        assert motion.load(0.0) == 0.0
-        assert 0.2 <= motion.load(motion.loads[0][0]) <= 1.0
-        assert motion.load(motion.loads[1][0]) == 0.0
+        assert 0.0 < motion.loads[0][0] < motion.loads[1][0]
+        assert 0.2 <= motion.loads[0][1] <= 1.0
+        assert motion.loads[1][1] == 0.0
     else:
         assert hand[:, 2].min() > 0.0
 

@@ -8,10 +8,9 @@ import numpy as np
 from pretouch.robot.body import placed
 from pretouch.robot.postures import brought_to
 from pretouch.sim.plant import Plant, PointForce
-from pretouch.sim.plant_params import PlantParams
 from pretouch.types import FloatArray
 from pretouch_lab.bench.dense_skin import gap, surface
-from pretouch_lab.bench.scenes import SeedRange, Sensing, model, numbered, path_of, scenario
+from pretouch_lab.bench.scenes import SeedRange, model, numbered, path_of, plant_of, scenario, sensing_of
 from pretouch_lab.bench.streams import AWAY, Alone, Stream, record
 
 _TRIES = 400
@@ -85,14 +84,11 @@ def contact_cells(seeds: SeedRange, quick: bool) -> list[ContactCell]:
     ]
 
 
-def plan(cell: ContactCell, hand_radius: float, warm_up_s: float | None = None) -> list[Touching]:
-    """Draw a cell's contacts: the seed says where, how and when.
-
-    The first is after a warm-up [s], the scenario file's unless another is given.
-    """
+def plan(cell: ContactCell, hand_radius: float) -> list[Touching]:
+    """Draw a cell's contacts: the seed says where, how and when."""
     family, rng = scenario("contacts"), np.random.default_rng([cell.seed, 32])
-    at, touches = float(family["duration"]["warm_up_s"] if warm_up_s is None else warm_up_s), list[Touching]()
-    q = start_posture()
+    at, touches = float(family["duration"]["warm_up_s"]), list[Touching]()
+    q = brought_to(model(), path_of("rest").point(0.0))  # where the paths begin
     for _ in range(cell.count):
         touches.append(touching(family["contact"], q, at, hand_radius, rng))
         at = touches[-1].end + rng.uniform(*family["duration"]["gap_s"])
@@ -115,11 +111,6 @@ def touching(
     inwards /= np.linalg.norm(inwards)
     force = float(rng.choice(chosen["forces_n"]))
     return Touching(link, k, force, chosen["kind"][k]["rise_s"], duration, at, point, normal, inwards)
-
-
-def start_posture() -> FloatArray:
-    """Joint positions (n,) in which the paths begin [rad]."""
-    return brought_to(model(), path_of("rest").point(0.0))
 
 
 def place_on(
@@ -193,21 +184,25 @@ class Toucher:
         return np.asarray(origin + rotation @ (touch.point + (self._radius + off) * touch.normal))
 
 
-def contact_stream(cell: ContactCell, plant: PlantParams, sensing: Sensing, warm_up_s: float | None = None) -> Stream:
-    """Let an arm be touched and return its stream, with its contacts in it: `touch.NAME` for each field of `Touching`.
-
-    `cell` says how fast, how often and with which seed; `plant` and `sensing` on which arm.
-    """
-    touches = plan(cell, sensing.hand_radius, warm_up_s)
-    path = path_of("circle" if cell.speed_m_s > 0 else "rest")
-    end = touches[-1].end + scenario("contacts")["judged"]["late_s"] + 0.1
-    what = Alone(path, cell.speed_m_s, plant, sensing, sensing.hand_radius, cell.seed, end, cell.world)
+def contact_stream(cell: ContactCell) -> Stream:
+    """Let an arm be touched, and return its stream with its contacts, see `described`."""
+    sensing = sensing_of(cell.sensing, cell.seed)
+    touches = plan(cell, sensing.hand_radius)
+    what = Alone(
+        path_of("circle" if cell.speed_m_s > 0 else "rest"), cell.speed_m_s, plant_of(cell.kind), sensing,
+        sensing.hand_radius, cell.seed, last_s(touches), cell.world,
+    )  # fmt: skip
     stream = record(what, lambda plant: Toucher(plant, touches, sensing.hand_radius).hand)
     return replace(stream, truth=described(touches, sensing.hand_radius))
 
 
+def last_s(touches: list[Touching]) -> float:
+    """Return when the last contact can no more be judged [s]."""
+    return touches[-1].end + float(scenario("contacts")["judged"]["late_s"]) + 0.1
+
+
 def described(touches: list[Touching], hand_radius: float) -> dict[str, FloatArray]:
-    """Return contacts as arrays for a stream."""
+    """Return contacts as arrays for a stream, `touch.NAME` for each field of `Touching`."""
     names = [f.name for f in fields(Touching)]
     arrays = {f"touch.{name}": np.array([getattr(touch, name) for touch in touches]) for name in names}
     return arrays | {"hand_radius": np.array(hand_radius)}

@@ -16,7 +16,7 @@ from pretouch_lab.bench.contenders import DETECTORS, Contender, ablated
 from pretouch_lab.bench.free import FreeCell, free_cells, free_stream, warm_up_s
 from pretouch_lab.bench.hard import HardCell, hard_cells, hard_stream
 from pretouch_lab.bench.replays import PERIOD_S, REST, Replayed, Steps, alarms_of
-from pretouch_lab.bench.scenes import SeedRange, model, plant_of, scenario, sensing_of
+from pretouch_lab.bench.scenes import SeedRange, model, scenario
 from pretouch_lab.bench.streams import Stream
 from pretouch_lab.run import Cell, Play, Row
 from pretouch_lab.table import rounded
@@ -71,10 +71,8 @@ def rows_of(played: list[Row]) -> list[Row]:
 def streamed(arm: Arm, quick: bool) -> Stream:
     """Let an arm run, and return its stream."""
     if isinstance(arm, FreeCell):
-        return free_stream(arm, plant_of(arm.kind), sensing_of("seven", arm.seed), warm_up_s())
-    if isinstance(arm, ContactCell):
-        return contact_stream(arm, plant_of(arm.kind), sensing_of(arm.sensing, arm.seed))
-    return hard_stream(arm, quick)
+        return free_stream(arm)
+    return contact_stream(arm) if isinstance(arm, ContactCell) else hard_stream(arm, quick)
 
 
 def is_touched(arm: Arm) -> bool:

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.sim.plant_params import PlantParams
 from pretouch.types import FloatArray
-from pretouch_lab.bench.scenes import SeedRange, Sensing, numbered, path_of, scenario
+from pretouch_lab.bench.scenes import SeedRange, numbered, path_of, plant_of, scenario, sensing_of
 from pretouch_lab.bench.streams import AWAY, Alone, Prepare, Stream, record
 
 _HAND_SIDE_M = 0.102
@@ -51,15 +50,12 @@ def warm_up_s() -> float:
     return float(scenario("free")["duration"]["warm_up_s"])
 
 
-def free_stream(cell: FreeCell, plant: PlantParams, sensing: Sensing, before_s: float) -> Stream:
-    """Let an arm move that nothing touches, and return its stream; `before_s` [s] come before what counts.
-
-    `cell` says on which path, how fast, who is near and with which seed; `plant` and `sensing` say which arm it is.
-    """
-    seen = None if cell.near == "nothing" else sensing
+def free_stream(cell: FreeCell) -> Stream:
+    """Let an arm move that nothing touches, with the skin of seven units where somebody is near; return its stream."""
     what = Alone(
-        path_of(cell.path), cell.speed_m_s, plant, seen, scenario("free")["near"]["radius_m"], cell.seed,
-        before_s + cell.counted_s, cell.world,
+        path_of(cell.path), cell.speed_m_s, plant_of(cell.kind),
+        None if cell.near == "nothing" else sensing_of("seven", cell.seed), scenario("free")["near"]["radius_m"],
+        cell.seed, warm_up_s() + cell.counted_s, cell.world,
     )  # fmt: skip
     return record(what, _bystander(cell))
 

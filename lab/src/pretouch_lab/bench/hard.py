@@ -10,7 +10,7 @@ from pretouch.robot.body import placed
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.types import FloatArray
-from pretouch_lab.bench.contacts import Toucher, Touching, described, place_on
+from pretouch_lab.bench.contacts import Toucher, Touching, described, last_s, place_on
 from pretouch_lab.bench.dense_skin import gap
 from pretouch_lab.bench.motions import Motion, motion_of
 from pretouch_lab.bench.scenes import SeedRange, model, numbered, path_of, scenario, sensing_of
@@ -69,7 +69,7 @@ def hard_stream(cell: HardCell, quick: bool) -> Stream:
     what = Alone(
         path_of("rest"), profile(PROFILE).task.speed_m_s, PlantParams(), None if cell.near == "nothing" else sensing,
         sensing.hand_radius if touches else family["near"]["radius_m"], cell.seed,
-        touches[-1].end + scenario("contacts")["judged"]["late_s"] + 0.1 if touches else start + cell.counted_s, WORLD,
+        last_s(touches) if touches else start + cell.counted_s, WORLD,
         motion.course.at(0.0)[0],
     )  # fmt: skip
 

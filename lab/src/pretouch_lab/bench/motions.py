@@ -104,10 +104,6 @@ class Motion:
     loads: tuple[tuple[float, float], ...] = ()
     """From each time on [s] what it carries [kg]."""
 
-    def load(self, time: float) -> float:
-        """Return what it carries at a time [kg]."""
-        return next((kg for since, kg in reversed(self.loads) if since <= time), 0.0)
-
 
 def motion_of(name: str, seed: int, until: float) -> Motion:
     """Draw a motion of the scenario file by its name for so long [s]; the seed says which."""

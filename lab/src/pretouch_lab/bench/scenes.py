@@ -47,6 +47,7 @@ def scenario_path(name: str, folder: Path = FOLDER) -> Path:
     return path
 
 
+@cache
 def scenario(name: str, folder: Path = FOLDER) -> dict[str, Any]:
     """Read a scenario file of this name without `.toml`; one that was changed is an ExperimentError."""
     return tomllib.loads(scenario_path(f"{name}.toml", folder).read_text(encoding="utf-8"))
@@ -69,12 +70,10 @@ def numbered(
 
     The n-th of the full run has the n-th seed, in a quick run too.
     """
-    number = 0
-    for entry in entries:
-        for i in range(entry["full"]):
-            if i < entry["quick"] or not quick:
-                yield entry, seed_of(family, seeds, number)
-            number += 1
+    every = [(entry, i) for entry in entries for i in range(entry["full"])]
+    for number, (entry, i) in enumerate(every):
+        if i < entry["quick"] or not quick:
+            yield entry, seed_of(family, seeds, number)
 
 
 def seed_of(family: dict[str, Any], seeds: SeedRange, number: int) -> int:
@@ -115,8 +114,7 @@ def sensing_of(name: str, seed: int, skin: Skin | None = None) -> Sensing:
     kind, radius = values.pop("skin"), values.pop("hand_radius")
     error = Misplacement(values.pop("position_mm", 0.0), values.pop("orientation_deg", 0.0))
     units = skin or (paper_skin(model()) if kind == "seven" else load_skin(scenario_path("dense_skin.toml"), model()))
-    exact = error == Misplacement()
-    believed = units if exact else misplaced(units, model(), error, seed)[0]
+    believed = units if error == Misplacement() else misplaced(units, model(), error, seed)[0]
     return Sensing(units, believed, RangeFinderParams(**values), radius)
 
 
