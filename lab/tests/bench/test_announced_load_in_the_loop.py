@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from lab.tests.bench.wandering import WanderingController
 
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
@@ -13,7 +14,7 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinders
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import ControlStep, Mode, Payload
-from pretouch_lab.bench.motions import WanderingController, motion_of
+from pretouch_lab.bench.motions import motion_of
 from pretouch_lab.bench.scenes import path_of, sensing_of
 from pretouch_lab.bench.streams import AWAY, Alone, record
 from pretouch_lab.trial import play

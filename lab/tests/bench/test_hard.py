@@ -6,12 +6,13 @@ from functools import partial
 
 import numpy as np
 import pytest
+from lab.tests.bench.wandering import WanderingController
 
 from pretouch_lab.bench import hard
 from pretouch_lab.bench.contenders import DETECTORS
 from pretouch_lab.bench.detection_results import HARD, UNTOLD, arms_of, hard_rows
 from pretouch_lab.bench.hard import HardCell, hard_cells, hard_stream
-from pretouch_lab.bench.motions import WanderingController, motion_of
+from pretouch_lab.bench.motions import motion_of
 from pretouch_lab.bench.scenes import model, scenario
 from pretouch_lab.bench.streams import record
 
@@ -50,14 +51,14 @@ def test_a_hard_motion_is_within_the_limits_and_as_fast_as_it_says(name):
 @pytest.mark.slow
 def test_a_hard_arm_moves_and_sees_without_a_controller_as_with_one(monkeypatch):
     cell = HardCell("pick-and-place", "standing", 1003, 1.0)
-    made, alone = hard_stream(cell, True), hard_stream(replace(cell, near="nothing"), True)
+    (made, _), (alone, _) = hard_stream(cell, True), hard_stream(replace(cell, near="nothing"), True)
     assert made.stamp[-1] == pytest.approx(61.0, abs=0.05)
 
     def by_controller(what, prepare, command):
         return record(replace(what, controller=partial(WanderingController, command.__self__)), prepare)
 
     monkeypatch.setattr(hard, "record_moved", by_controller)
-    controlled = hard_stream(cell, True)
+    controlled, _ = hard_stream(cell, True)
     assert made.count.max() > 0
     np.testing.assert_array_equal(made.watched, controlled.watched)
     np.testing.assert_array_equal(made.count, controlled.count)

@@ -1,6 +1,5 @@
 """The localisation benchmark: its motion, its contacts, the limit of what torques tell, and what rows say."""
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,8 +8,8 @@ from numpy.testing import assert_allclose
 
 from pretouch.types import NOT_TOUCHED, RobotState, Touched
 from pretouch_lab.bench import localization
-from pretouch_lab.bench.contacts import Touching, described
-from pretouch_lab.bench.localization import LINK_M, name_of, planned, plays, results, stream_plays, tables, trial
+from pretouch_lab.bench.contacts import Touching
+from pretouch_lab.bench.localization import LINK_M, name_of, planned, plays, replayed, results, rows_of, tables, trial
 from pretouch_lab.bench.motions import wandering
 from pretouch_lab.bench.scenes import model
 
@@ -23,7 +22,7 @@ def touching(link: str, force: float = 20.0) -> Touching:
     index = arm.link_index(f"panda_{link}")
     c = int(np.flatnonzero(arm.surface.link == index)[0])
     point, normal = arm.surface.point[c], arm.surface.normal[c]
-    return Touching(index, 0, force, 0.02, 0.4, 1.0, point, normal, -normal)
+    return Touching(index, 0, force, 0.02, 0.4, 1.0, point, normal, -normal, 0.05)
 
 
 def at(link: int, place: np.ndarray) -> Touched:
@@ -44,12 +43,11 @@ def replay(monkeypatch: pytest.MonkeyPatch):
         for k in range(len(touched) + 1):
             robot = RobotState(1.0 + 0.1 * k, READY, none, READY, none, none, None)
             steps.append((robot, localization.NOTHING, False, True))
-        stream = SimpleNamespace(truth=described([touch], 0.05), steps=lambda: steps)
+        stream = SimpleNamespace(steps=lambda: steps)
         learnt = SimpleNamespace(test=SimpleNamespace(model=SimpleNamespace(spread=LEARNT)))
         alone = SimpleNamespace(state=learnt, step=lambda *_: SimpleNamespace(touched=next(answers)))
-        monkeypatch.setattr(localization, "_stream", lambda *_: stream)
         monkeypatch.setattr(localization, "DetectorAlone", lambda *_: alone)
-        return trial(Path(), {"sensing": "nominal", "skin": "none"}, 0)
+        return replayed(stream, [touch], "none")
 
     return replay
 
@@ -74,15 +72,16 @@ def test_contacts_are_those_of_the_goals():
     assert len({touch.link for touch in touches}) == 8
 
 
-def test_an_arm_has_the_same_seed_with_each_skin():
-    streams = stream_plays("development", quick=True)
-    assert [(cell["sensing"], seed) for cell, seed in streams] == [
+def test_an_arm_has_the_same_seed_with_each_skin(monkeypatch):
+    arms = plays("development", quick=True)
+    assert [(cell["sensing"], seed) for cell, seed in arms] == [
         (sensing, seed) for seed in (1000, 1001) for sensing in ("nominal", "seven", "misplaced")
     ]
-    assert [cell["skin"] for cell, seed in plays(streams) if seed == 1000][:3] == [
-        "32 units", "none", "none, nothing learnt"
-    ]  # fmt: skip
-    assert len(stream_plays("published", quick=False)) == 24 * 3
+    monkeypatch.setattr(localization, "streamed", lambda *_: (None, None))
+    monkeypatch.setattr(localization, "replayed", lambda *_: {})
+    rows = rows_of([cell | {"seed": seed} | trial(cell, seed) for cell, seed in arms])
+    assert [row["skin"] for row in rows if row["seed"] == 1000][:3] == ["32 units", "none", "none, nothing learnt"]
+    assert len(plays("published", quick=False)) == 24 * 3
 
 
 def test_links_that_the_same_joints_move_are_one_body():

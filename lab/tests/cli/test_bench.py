@@ -36,7 +36,7 @@ def test_each_benchmark_plays_all_that_it_says(monkeypatch, tmp_path, name):
 
     monkeypatch.setattr(benchmarks, "played", played)
     assert cli.main(["bench", name, "--quick", "--out", str(tmp_path / "run")]) == 130
-    assert asked == [{"localization": (6, "streams"), "detection": (23, "run"), "avoidance": (132, "run")}[name]]
+    assert asked == [{"localization": (6, "run"), "detection": (23, "run"), "avoidance": (132, "run")}[name]]
 
 
 def test_bench_both_says_which_goals_were_reached(monkeypatch, capsys, tmp_path):

@@ -1,6 +1,6 @@
 """Contacts: true forces on the surface of an arm that does not react, brought by a hand that the skin may see."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -39,6 +39,8 @@ class Touching:
     """(3,) outward unit normal there, link frame."""
     inwards: FloatArray
     """(3,) unit vector of the force on the arm, link frame."""
+    hand_radius: float
+    """Of the visible hand that brings it [m]."""
 
     @property
     def end(self) -> float:
@@ -110,7 +112,8 @@ def touching(
     inwards = chosen["tilt"] * rng.uniform(-1, 1, 3) - normal
     inwards /= np.linalg.norm(inwards)
     force = float(rng.choice(chosen["forces_n"]))
-    return Touching(link, k, force, chosen["kind"][k]["rise_s"], duration, at, point, normal, inwards)
+    rise = chosen["kind"][k]["rise_s"]
+    return Touching(link, k, force, rise, duration, at, point, normal, inwards, hand_radius)
 
 
 def place_on(
@@ -136,10 +139,10 @@ def place_on(
 class Toucher:
     """Lays planned forces on an arm, and says where the hand is that brings them."""
 
-    def __init__(self, plant: Plant, touches: list[Touching], hand_radius: float) -> None:
+    def __init__(self, plant: Plant, touches: list[Touching]) -> None:
         """Attach to a plant: forces act from then on, whatever the arm does."""
         hand = scenario("contacts")["hand"]
-        self._plant, self._touches, self._radius = plant, touches, hand_radius
+        self._plant, self._touches = plant, touches
         self._from, self._speed = hand["from_m"], hand["speed_m_s"]
         self._way_s = self._from / self._speed
         self._next = 0
@@ -181,38 +184,20 @@ class Toucher:
             return AWAY
         off = self._speed * max(touch.start - time, time - touch.end, 0.0)
         rotation, origin = self._plant.link_rotation[touch.link], self._plant.link_position[touch.link]
-        return np.asarray(origin + rotation @ (touch.point + (self._radius + off) * touch.normal))
+        return np.asarray(origin + rotation @ (touch.point + (touch.hand_radius + off) * touch.normal))
 
 
-def contact_stream(cell: ContactCell) -> Stream:
-    """Let an arm be touched, and return its stream with its contacts, see `described`."""
+def contact_stream(cell: ContactCell) -> tuple[Stream, list[Touching]]:
+    """Let an arm be touched; return its stream and its contacts."""
     sensing = sensing_of(cell.sensing, cell.seed)
     touches = plan(cell, sensing.hand_radius)
     what = Alone(
         path_of("circle" if cell.speed_m_s > 0 else "rest"), cell.speed_m_s, plant_of(cell.kind), sensing,
         sensing.hand_radius, cell.seed, last_s(touches), cell.world,
     )  # fmt: skip
-    stream = record(what, lambda plant: Toucher(plant, touches, sensing.hand_radius).hand)
-    return replace(stream, truth=described(touches, sensing.hand_radius))
+    return record(what, lambda plant: Toucher(plant, touches).hand), touches
 
 
 def last_s(touches: list[Touching]) -> float:
     """Return when the last contact can no more be judged [s]."""
     return touches[-1].end + float(scenario("contacts")["judged"]["late_s"]) + 0.1
-
-
-def described(touches: list[Touching], hand_radius: float) -> dict[str, FloatArray]:
-    """Return contacts as arrays for a stream, `touch.NAME` for each field of `Touching`."""
-    names = [f.name for f in fields(Touching)]
-    arrays = {f"touch.{name}": np.array([getattr(touch, name) for touch in touches]) for name in names}
-    return arrays | {"hand_radius": np.array(hand_radius)}
-
-
-def touches_of(stream: Stream) -> list[Touching]:
-    """Return the contacts of a recorded stream."""
-    found = []
-    for i in range(len(stream.truth["touch.start"])):
-        row: dict[str, Any] = {f.name: stream.truth[f"touch.{f.name}"][i] for f in fields(Touching)}
-        row["link"], row["kind"] = int(row["link"]), int(row["kind"])
-        found.append(Touching(**row))
-    return found

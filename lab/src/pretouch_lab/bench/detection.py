@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pretouch.types import FloatArray
-from pretouch_lab.bench.contacts import ContactCell, Touching, contact_cells, contact_stream, touches_of
+from pretouch_lab.bench.contacts import ContactCell, Touching, contact_cells, contact_stream
 from pretouch_lab.bench.contenders import DETECTORS, Contender, ablated
 from pretouch_lab.bench.free import FreeCell, free_cells, free_stream, warm_up_s
 from pretouch_lab.bench.hard import HardCell, hard_cells, hard_stream
@@ -53,10 +53,14 @@ def trial(seeds: SeedRange, quick: bool, world: str, cell: Cell, _seed: int) -> 
     """Simulate an arm, and give what it said to one detector after the other."""
     every = arms(seeds, quick, world)
     arm = every[cell["family"], cell["name"]]
-    stream, judge = streamed(arm, quick), judged_contacts if is_touched(arm) else judged_free
+    stream, touches = streamed(arm, quick)
     steps = Steps(stream, model())
-    judged = [{"contender": one.name, **judge(steps, one)} for one in contenders_of(arm, every.values())]
-    return {"arm": asdict(arm), "detectors": judged}
+
+    def judged(contender: Contender) -> Row:
+        return judged_contacts(steps, touches, contender) if touches else judged_free(steps, contender)
+
+    judgements = [{"contender": one.name, **judged(one)} for one in contenders_of(arm, every.values())]
+    return {"arm": asdict(arm), "detectors": judgements}
 
 
 def rows_of(played: list[Row]) -> list[Row]:
@@ -68,16 +72,11 @@ def rows_of(played: list[Row]) -> list[Row]:
     ]
 
 
-def streamed(arm: Arm, quick: bool) -> Stream:
-    """Let an arm run, and return its stream."""
+def streamed(arm: Arm, quick: bool) -> tuple[Stream, list[Touching]]:
+    """Let an arm run, and return its stream and its contacts, none where it is not touched."""
     if isinstance(arm, FreeCell):
-        return free_stream(arm)
+        return free_stream(arm), []
     return contact_stream(arm) if isinstance(arm, ContactCell) else hard_stream(arm, quick)
-
-
-def is_touched(arm: Arm) -> bool:
-    """Whether contacts are laid on an arm."""
-    return isinstance(arm, ContactCell) or (isinstance(arm, HardCell) and arm.near == "touched")
 
 
 def contenders_of(arm: Arm, every: Iterable[Arm]) -> tuple[Contender, ...]:
@@ -106,10 +105,9 @@ def judged_free(steps: Steps, contender: Contender) -> Row:
     return {"hours": float(counted.sum()) * PERIOD_S / 3600, "alarms": alarms, "sweep": swept}
 
 
-def judged_contacts(steps: Steps, contender: Contender) -> Row:
+def judged_contacts(steps: Steps, touches: list[Touching], contender: Contender) -> Row:
     """Match a detector's alarms with the contacts of a stream, as it is and at each value of its sweep."""
     stream, replayed = steps.stream, steps.replay(contender)
-    touches = touches_of(stream)
     matches = matched(touches, stream.stamp, replayed.onsets())
     swept = [matched(touches, stream.stamp, replayed.onsets(value)) for value in sweep_values(contender)]
     noise = quiet_spread(stream, touches[0].start)
@@ -161,9 +159,8 @@ def about(touch: Touching, stream: Stream, noise: FloatArray) -> dict[str, Any]:
     step = max(0, int(np.searchsorted(stream.stamp, touch.onset(judged["onset_n"]), side="right")) - 1)
     kin = model().kinematics(stream.robot["q"][step])
     rotation, origin = kin.rotation[touch.link], kin.position[touch.link]
-    radius = float(stream.truth["hand_radius"])
-    hand = origin + rotation @ (touch.point + radius * touch.normal)
-    away = np.linalg.norm(stream.obstacle_points(step) - hand, axis=1).min(initial=np.inf) - radius
+    hand = origin + rotation @ (touch.point + touch.hand_radius * touch.normal)
+    away = np.linalg.norm(stream.obstacle_points(step) - hand, axis=1).min(initial=np.inf) - touch.hand_radius
     jacobian = model().jacobian(kin, touch.link, origin + rotation @ touch.point)[:3]
     torque = np.abs(jacobian.T @ (touch.force_n * (rotation @ touch.inwards)))
     return {

@@ -1,7 +1,7 @@
 """Arms as unkind as real ones, in motions other than circle and line: free, or touched (`scenarios/hard.toml`)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from pretouch.robot.body import placed
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.types import FloatArray
-from pretouch_lab.bench.contacts import Toucher, Touching, described, last_s, place_on
+from pretouch_lab.bench.contacts import Toucher, Touching, last_s, place_on
 from pretouch_lab.bench.dense_skin import gap
 from pretouch_lab.bench.motions import Motion, motion_of
 from pretouch_lab.bench.scenes import SeedRange, model, numbered, path_of, scenario, sensing_of
@@ -57,8 +57,8 @@ def _touches(quick: bool) -> int:
     return int(scenario("hard")["contact"]["quick" if quick else "full"])
 
 
-def hard_stream(cell: HardCell, quick: bool) -> Stream:
-    """Let an arm move and return its stream, with its contacts if it is touched.
+def hard_stream(cell: HardCell, quick: bool) -> tuple[Stream, list[Touching]]:
+    """Let an arm move; return its stream and its contacts, none where it is not touched.
 
     With nobody near it has no units: the few readings that they would make of the arm itself are left out.
     """
@@ -76,11 +76,10 @@ def hard_stream(cell: HardCell, quick: bool) -> Stream:
     def prepare(plant: Plant) -> Place:
         plant.before_each_step(_gripping(plant, motion))
         if touches:
-            return Toucher(plant, touches, sensing.hand_radius).hand
+            return Toucher(plant, touches).hand
         return _beside(motion, cell.seed) if cell.near == "standing" else AWAY
 
-    stream = record_moved(what, prepare, motion.course.command)
-    return replace(stream, truth=described(touches, sensing.hand_radius) if touches else {})
+    return record_moved(what, prepare, motion.course.command), touches
 
 
 def _gripping(plant: Plant, motion: Motion) -> Callable[[float], float]:
@@ -124,7 +123,7 @@ def _touched(cell: HardCell, motion: Motion, number: int) -> list[Touching]:
         inwards = chosen["tilt"] * rng.uniform(-1, 1, 3) - normal
         touch = Touching(
             link, _PUSH, float(rng.choice(chosen["forces_n"])), chosen["rise_s"],
-            float(rng.choice(chosen["durations_s"])), at, point, normal, inwards / np.linalg.norm(inwards),
+            float(rng.choice(chosen["durations_s"])), at, point, normal, inwards / np.linalg.norm(inwards), radius,
         )  # fmt: skip
         found.append(touch)
         at = touch.end + rng.uniform(*chosen["gap_s"])

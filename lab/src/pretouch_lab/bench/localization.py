@@ -2,10 +2,7 @@
 
 import time
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import replace
-from functools import cache, partial
-from pathlib import Path
+from functools import cache
 
 import numpy as np
 
@@ -13,13 +10,12 @@ from pretouch.params import LocalisationParams, SequentialParams
 from pretouch.profiles import profile
 from pretouch.robot.body import from_axes
 from pretouch.robot.kinematics import Kinematics
-from pretouch.sim.plant import Plant
 from pretouch.text_table import TextTable
 from pretouch.types import FloatArray, Touched
-from pretouch_lab.bench.contacts import Toucher, Touching, described, touches_of, touching
-from pretouch_lab.bench.motions import Wandering, WanderingController, wandering
+from pretouch_lab.bench.contacts import Toucher, Touching, touching
+from pretouch_lab.bench.motions import Wandering, wandering
 from pretouch_lab.bench.scenes import SeedRange, model, numbered, path_of, plant_of, scenario, sensing_of
-from pretouch_lab.bench.streams import NOTHING, PROFILE, Alone, Stream, load_stream, record, save_stream
+from pretouch_lab.bench.streams import NOTHING, PROFILE, Alone, Stream, record_moved
 from pretouch_lab.replay import DetectorAlone
 from pretouch_lab.run import Cell, Play, Row
 from pretouch_lab.table import Column, rounded, summary, table
@@ -38,22 +34,13 @@ SAMPLES = 6
 _STEP_M = 1e-4
 
 
-def stream_plays(seeds: SeedRange, quick: bool) -> list[Play]:
-    """Return the streams to record; an arm has the same seed, and so the same contacts, with each skin."""
+def plays(seeds: SeedRange, quick: bool) -> list[Play]:
+    """Return the arms to play, each with a skin; an arm has the same seed, and so the same contacts, with each."""
     family = scenario("localization")
     return [
         ({"sensing": sensing}, seed)
         for cell, seed in numbered(family, family["cell"], seeds, quick)
         for sensing in cell["sensing"]
-    ]
-
-
-def plays(streams: list[Play]) -> list[Play]:
-    """Return the replays of streams, with their skins and without any."""
-    return [
-        ({"sensing": cell["sensing"], "skin": skin}, seed)
-        for cell, seed in streams
-        for skin in (SKINS[cell["sensing"]], *(WITHOUT if cell["sensing"] == "nominal" else ()))
     ]
 
 
@@ -70,17 +57,8 @@ def planned(seed: int) -> tuple[Wandering, list[Touching]]:
     return course, touches
 
 
-def record_stream(out: Path, cell: Cell, seed: int) -> Row:
-    """Record the stream of an arm with a skin, before it is replayed in several ways."""
-    return {"steps": len(_stream(out, cell["sensing"], seed).count)}
-
-
-def _stream(out: Path, skin: str, seed: int) -> Stream:
-    """Return the stream of an arm with a skin, with its contacts in it, recorded now where none can be read."""
-    file = out / "streams" / f"{skin}_{seed:04d}.npz"
-    stored = load_stream(file)
-    if stored is not None:
-        return stored
+def streamed(skin: str, seed: int) -> tuple[Stream, list[Touching]]:
+    """Return the stream of an arm with a skin, and its contacts."""
     course, touches = planned(seed)
     sensing = sensing_of(skin, seed)
     what = Alone(
@@ -92,25 +70,29 @@ def _stream(out: Path, skin: str, seed: int) -> Stream:
         seed,
         touches[-1].end + _TAIL_S,
         start=course.at(0.0)[0],
-        controller=partial(WanderingController, course),
     )
-
-    def prepare(plant: Plant) -> Callable[[float], FloatArray]:
-        return Toucher(plant, touches, sensing.hand_radius).hand
-
-    stream = replace(record(what, prepare), truth=described(touches, sensing.hand_radius))
-    save_stream(stream, file)
-    return stream
+    return record_moved(what, lambda plant: Toucher(plant, touches).hand, course.command), touches
 
 
-def trial(out: Path, cell: Cell, seed: int) -> Row:
+def trial(cell: Cell, seed: int) -> Row:
+    """Simulate an arm, and judge where the profile says its contacts are, with its skin and without any."""
+    stream, touches = streamed(cell["sensing"], seed)
+    skins = SKINS[cell["sensing"]], *(WITHOUT if cell["sensing"] == "nominal" else ())
+    return {"skins": [{"skin": skin, **replayed(stream, touches, skin)} for skin in skins]}
+
+
+def rows_of(played: list[Row]) -> list[Row]:
+    """Return a row for each arm and skin."""
+    return [{"sensing": row["sensing"], "seed": row["seed"], **one} for row in played for one in row["skins"]]
+
+
+def replayed(stream: Stream, touches: list[Touching], skin: str) -> Row:
     """Give the profile each step of a stream as with the skin that is named, and judge where it says contacts are.
 
     Each contact is judged twice: some time after it began, and at its end, by the last step not later than that.
     """
-    params, arm, blind = profile("pretouch"), model(), cell["skin"] in WITHOUT
-    stream = _stream(out, cell["sensing"], seed)
-    touches, detector = touches_of(stream), DetectorAlone(params, arm)
+    params, arm, blind = profile("pretouch"), model(), skin in WITHOUT
+    detector = DetectorAlone(params, arm)
     learning_s = scenario("localization")["duration"]["warm_up_s"] - 1.0
     rows: list[Row] = [{"link": name_of(t.link), "force_n": t.force_n, "duration_s": t.duration_s} for t in touches]
     due = sorted(
@@ -121,7 +103,7 @@ def trial(out: Path, cell: Cell, seed: int) -> Row:
         while due and before is not None and robot.stamp > due[0][0] + 1e-9:
             _, k, at = due.pop(0)
             rows[k] |= judged(touches[k], *before, at)
-        sees = watched and cell["skin"] != WITHOUT[1] and (not blind or robot.stamp < learning_s)
+        sees = watched and skin != WITHOUT[1] and (not blind or robot.stamp < learning_s)
         kin, begin = arm.kinematics(robot.q), time.thread_time()
         detection = detector.step(kin, robot, NOTHING if blind else obstacles, False, sees)
         if len(detection.touched.link):

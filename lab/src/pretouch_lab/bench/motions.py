@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from pretouch.controller import Controller, ControllerState
 from pretouch.robot.body import placed
 from pretouch.robot.postures import brought_to
-from pretouch.types import ControlStep, FloatArray, Inputs
+from pretouch.types import FloatArray
 from pretouch_lab.bench.dense_skin import gap
 from pretouch_lab.bench.scenes import model, scenario
 
@@ -77,23 +76,6 @@ def is_free(q: FloatArray) -> bool:
         if gap(points, a[others], b[others], body.radius[others]).min() < body.radius[c] + chosen["apart_m"]:
             return False
     return True
-
-
-class WanderingController(Controller):
-    """Sees and judges as any other, but moves along a course whatever that says."""
-
-    def __init__(self, course: Wandering, *given: Any) -> None:
-        """Take the course, and what any controller is made of."""
-        super().__init__(*given)
-        self.course = course
-
-    def step(self, state: ControllerState, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
-        """Run one control cycle and command the course in place of what it decided."""
-        step, after = super().step(state, inputs)
-        command = self.course.command(inputs.stamp, after.memory.get("watch.robot.q_commanded"))
-        after.memory.put("command", command)  # of this very step: nobody else has it yet
-        object.__setattr__(step, "command", command)
-        return step, after
 
 
 @dataclass(frozen=True)

@@ -4,14 +4,11 @@ The arm goes on whatever touches it, in a room with one ghost.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, fields, replace
-from pathlib import Path
+from dataclasses import dataclass, fields, replace
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 
-from pretouch.atomic_write import atomic_replacement
 from pretouch.control.path import Path as TaskPath
 from pretouch.controller import Controller
 from pretouch.line import SEE
@@ -57,8 +54,6 @@ class Stream:
     """(S,) how many obstacles there were."""
     obstacles: dict[str, Any]
     """Each field of `Obstacles` of all steps, one after the other, (sum of counts, ...)."""
-    truth: dict[str, FloatArray] = field(default_factory=dict)
-    """What else is known of the trial, by name."""
 
     @property
     def stamp(self) -> FloatArray:
@@ -113,12 +108,12 @@ class StreamRecorder:
         self._obstacles.append(near if len(near.unit) else NOTHING)
         self._flags.append((reacting, stamp - float(heard.min(initial=np.inf)) <= self._patience))
 
-    def stream(self, truth: dict[str, FloatArray] | None = None) -> Stream:
+    def stream(self) -> Stream:
         """Return all that was kept."""
         near = {name: np.concatenate([getattr(o, name) for o in self._obstacles]) for name in _OBSTACLES}
         count = np.array([len(o.unit) for o in self._obstacles], dtype=np.int64)
         reacting, watched = np.array(self._flags, dtype=np.float64).T
-        return Stream(_fields_of(self._robot), reacting.copy(), watched.copy(), count, near, truth or {})
+        return Stream(_fields_of(self._robot), reacting.copy(), watched.copy(), count, near)
 
 
 def _fields_of(rows: list[FloatArray]) -> dict[str, FloatArray]:
@@ -126,31 +121,6 @@ def _fields_of(rows: list[FloatArray]) -> dict[str, FloatArray]:
     n, every = model().n, np.array(rows)
     fields = np.split(every, np.cumsum([1, n, n, n, n, n]), axis=1)
     return dict(zip(_ROBOT, (fields[0][:, 0].copy(), *(part.copy() for part in fields[1:])), strict=True))
-
-
-def save_stream(stream: Stream, path: Path) -> None:
-    """Write a stream to an .npz file, whole or not at all."""
-    arrays: dict[str, FloatArray] = {"reacting": stream.reacting, "watched": stream.watched, "count": stream.count}  # type: ignore[dict-item]
-    for part in ("robot", "obstacles", "truth"):
-        arrays |= {f"{part}.{name}": values for name, values in getattr(stream, part).items()}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_replacement(path) as unfinished, unfinished.open("wb") as file:
-        np.savez(file, **arrays)  # type: ignore[arg-type]  # names of arrays, not `allow_pickle`
-
-
-def load_stream(path: Path) -> Stream | None:
-    """Read a stream; None where there is none, or one that cannot be read."""
-    try:
-        with np.load(path, allow_pickle=False) as kept:
-            arrays = dict(kept)
-        parts: dict[str, dict[str, FloatArray]] = {"robot": {}, "obstacles": {}, "truth": {}}
-        for name, values in arrays.items():
-            part, _, what = name.partition(".")
-            if what:
-                parts[part][what] = values
-        return Stream(**parts, reacting=arrays["reacting"], watched=arrays["watched"], count=arrays["count"])
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile):
-        return None
 
 
 Prepare = Callable[[Plant], Place]

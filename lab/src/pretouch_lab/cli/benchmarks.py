@@ -92,10 +92,8 @@ def avoidance(options: bench.Avoidance) -> dict[str, Any]:
 def localization(options: bench.Localization) -> dict[str, Any]:
     """See its options."""
     out = _folder(options, "localization")
-    streams = locating.stream_plays(options.seeds, options.quick)
-    played("recording streams", partial(locating.record_stream, out), streams, out / "streams", options)
-    replays = played("replaying them", partial(locating.trial, out), locating.plays(streams), out, options)
-    rows = locating.results(replays)
+    arms = played("localization", locating.trial, locating.plays(options.seeds, options.quick), out, options)
+    rows = locating.results(locating.rows_of(arms))
     return _finished(options, "localization", out, locating.tables(rows), rows=rows)
 
 
