@@ -103,10 +103,10 @@ def test_a_folder_of_other_arguments_is_refused_and_says_which_differ(tmp_path, 
     with pytest.raises(ExperimentError, match="holds a run with commit = "):
         open_run(tmp_path, {"seeds": 3, "skin": None})
     assert (tmp_path / "run.json").read_text() == before
-    (tmp_path / "run.json").write_text("[]")
+    (tmp_path / "run.json").write_text("[1]")
     with pytest.raises(ExperimentError, match=r"run\.json is damaged"):
         open_run(tmp_path, {})
-    with pytest.raises(ExperimentError, match="cannot be used: Not a directory: give another --out"):
+    with pytest.raises(ExperimentError, match=r"Rows could not be kept in .*Not a directory"):
         open_run(tmp_path / "run.json" / "below", {})
 
 
@@ -178,7 +178,7 @@ def test_a_schedulers_workers_play_and_one_that_does_not_answer_is_named(tmp_pat
             rows = run(played, plays_of(CELLS, range(20)), tmp_path, executor, at_once)
         assert rows == run(played, plays_of(CELLS, range(20)), tmp_path / "here")
         with (
-            pytest.raises(ExperimentError, match="A worker of the cluster was killed"),
+            pytest.raises(ExperimentError, match="or a worker of it was killed"),
             workers(scheduler=cluster.scheduler_address) as pool,
         ):
             run(killed, [(CELLS[1], 77)], tmp_path, *pool)

@@ -3,7 +3,7 @@
 import os
 import re
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
 from hashlib import sha256
@@ -128,8 +128,8 @@ def experiment(name: str) -> Experiment:
     """Return an experiment by its name."""
     if name not in NAMES:
         raise ExperimentError(f"The experiment {name!r} is unknown: choose from {', '.join([*NAMES, 'all'])}.")
-    found: Experiment = import_module(f"pretouch_lab.experiments.{name.replace('-', '_')}").EXPERIMENT
-    return found
+    own: Experiment = import_module(f"pretouch_lab.experiments.{name.replace('-', '_')}").EXPERIMENT
+    return own
 
 
 def modes() -> dict[str, dict[str, str]]:
@@ -155,17 +155,6 @@ def controllers(options: Options, restrictions: str) -> list[Row]:
     return [{"profile": name, "restrictions": mode} for name, mode in dict.fromkeys(pairs)]
 
 
-def controller_named(rows: Iterable[Row]) -> list[Row]:
-    """Return rows with `controller`: the profile, and the restriction mode where the profile has rows with several."""
-    every = list(rows)
-    pairs = {(row["profile"], row["restrictions"]) for row in every}
-    several = {name for name, _ in pairs if sum(name == other for other, _ in pairs) > 1}
-    return [
-        row | {"controller": "\n".join([row["profile"], *[row["restrictions"]] * (row["profile"] in several)])}
-        for row in every
-    ]
-
-
 def first_sensing(rows: list[Row]) -> list[Row]:
     """Choose one of some cells or trials: the first with proximity, or the first where none has any."""
     return ([row for row in rows if profile(row["profile"]).perception is not None] or rows)[:1]
@@ -183,9 +172,8 @@ def check(options: Options, names: Sequence[str]) -> None:
         raise ExperimentError(f"The first seed is {options.first_seed}: give 0 or more.")
     for each in options.profiles:
         profile(each)
-    for mode in options.restrictions:
-        _check_choice("restriction mode", mode, tuple(modes()))
-    _check_choice("choice of trials to record", options.record, ("first", "all"))
+    if wrong := [mode for mode in options.restrictions if mode not in modes()]:
+        raise ExperimentError(f"The restriction mode {wrong[0]!r} is unknown: choose from {', '.join(modes())}.")
     for stiffness in options.stiffness:
         if not 100.0 <= stiffness <= 1e6:
             raise ExperimentError(f"The stiffness is {stiffness:g} N/m: give one from 100 to 1000000 N/m.")
@@ -196,11 +184,6 @@ def check(options: Options, names: Sequence[str]) -> None:
     if options.world:
         world_set(options.world)
     context_of(options.arm, options.skin, options.world)  # a bad skin is refused before any process starts
-
-
-def _check_choice(what: str, choice: str, allowed: tuple[str, ...]) -> None:
-    if choice not in allowed:
-        raise ExperimentError(f"The {what} {choice!r} is unknown: choose from {', '.join(allowed)}.")
 
 
 @lru_cache

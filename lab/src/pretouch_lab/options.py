@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from pretouch.cli.options import JsonFile, Numbers, Words
 
@@ -29,7 +30,7 @@ class Options:
     world: str = ""
     """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file, of which each trial's seed
     draws its own; by default the usual ones."""
-    record: str = "first"
+    record: Literal["first", "all"] = "first"
     """first: record the trials of the first seed of which figures are drawn; all: record every trial."""
 
 

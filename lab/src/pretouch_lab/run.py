@@ -228,14 +228,10 @@ def _cluster(scheduler: str) -> Iterator[tuple[Executor, int]]:
         try:
             # two for each thread, so that none waits while a row is on its way; workers may also come later
             yield client.get_executor(), max(1, 2 * sum(client.nthreads().values()))
-        except KilledWorker as error:
+        except (KilledWorker, CancelledError, CommClosedError) as error:
             raise ExperimentError(
-                f"A worker of the cluster was killed ({error}): the same command with the same --out goes on."
-            ) from error
-        except (CancelledError, CommClosedError) as error:
-            raise ExperimentError(
-                f"The scheduler at {scheduler} is gone. All finished plays are kept: start it again, and the same"
-                " command with the same --out goes on."
+                f"The scheduler at {scheduler} is gone, or a worker of it was killed ({error}). All finished plays are"
+                " kept: the same command with the same --out goes on."
             ) from error
 
 
@@ -259,24 +255,20 @@ def open_run(out: Path, arguments: Mapping[str, Any]) -> None:
     Raises ExperimentError for a folder that cannot be used, or that other arguments, another version or another commit
     of this package began.
     """
-    wanted = json.loads(json.dumps({"version": __version__, "commit": commit(), **arguments}))
+    own = json.loads(json.dumps({"version": __version__, "commit": commit(), **arguments}))
     place = out / RUN
     try:
-        out.mkdir(parents=True, exist_ok=True)
-        if not place.exists():
-            write_json(wanted, place)
-            return
-        before = json.loads(place.read_text(encoding="utf-8"))
-        if not isinstance(before, dict):
-            raise ValueError("it holds no object")
-    except OSError as error:
-        raise ExperimentError(f"The folder {out} cannot be used: {error.strerror}: give another --out.") from error
-    except (ValueError, RecursionError) as error:
+        with _kept_in(out):
+            out.mkdir(parents=True, exist_ok=True)
+            if not place.exists():
+                write_json(own, place)
+            before = dict(json.loads(place.read_text(encoding="utf-8")))
+    except (ValueError, TypeError, RecursionError) as error:
         raise ExperimentError(f"The file {place} is damaged ({error}): give another --out.") from error
     other = [
-        f"{name} = {before.get(name)!r}, not {wanted.get(name)!r}"
-        for name in dict.fromkeys([*before, *wanted])
-        if before.get(name) != wanted.get(name)
+        f"{name} = {before.get(name)!r}, not {own.get(name)!r}"
+        for name in dict.fromkeys([*before, *own])
+        if before.get(name) != own.get(name)
     ]
     if other:
         raise ExperimentError(

@@ -31,7 +31,6 @@ def run(capsys, *args):
         ("reproduce static --stiffness ''", "The stiffnesses are none: name each"),
         ("reproduce static --stiffness 25000,25000.0", "name each wanted one once"),
         ("reproduce static --skin /nowhere.toml", "/nowhere.toml cannot be read"),
-        ("reproduce static --record some", "The choice of trials to record 'some' is unknown"),
         ("reproduce static --world strange", "not one of nominal, realistic, stress"),
         ("reproduce static --out OUT --json /dev/null/x.json", "/dev/null/x.json cannot be written"),
         (

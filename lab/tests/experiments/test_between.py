@@ -73,7 +73,7 @@ def test_body_and_hand_are_on_opposite_sides_and_move_with_the_seed():
 def test_summary_and_table_count_what_the_rows_say(trials):
     rows = [json.loads(json.dumps(row, allow_nan=False)) for row, _ in trials.values()]
     (table,) = between.tables([*rows, {**rows[1], "detected": False, "detection_delay_s": None}])
-    assert [row[0] for row in table.rows] == ["blind", "paper"]
+    assert [row[0] for row in table.rows] == ["blind\noff", "paper\nslack"]
     assert table.rows[0][1:3] == ("0/1", "0/1")
     assert table.rows[1][1:5] == ("2/2", "2/2", "1/2", f"{1000 * rows[1]['detection_delay_s']:.0f}")
     assert width(table) <= 80

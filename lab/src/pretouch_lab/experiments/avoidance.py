@@ -13,7 +13,7 @@ from pretouch.sim.plant import Plant
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import TextTable
 from pretouch.types import FloatArray
-from pretouch_lab.experiment import Context, Drawing, Experiment, controller_named, controllers, first_sensing, main
+from pretouch_lab.experiment import Context, Drawing, Experiment, controllers, first_sensing, main
 from pretouch_lab.options import Options
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, medians, rounded
@@ -115,7 +115,7 @@ def gaps(record: Record, model: RobotModel, radius: float) -> FloatArray:
 
 _COLUMNS = (
     Column("hand", "place"),
-    Column("profile", "controller"),
+    Column("profile\nmode", "profile", second="restrictions"),
     Column("contact", "contact", of="trials"),
     Column("true\n[N]", "true_peak_n", 1),
     Column("least\ngap [m]", "least_gap_m", 3),
@@ -134,7 +134,7 @@ def tables(rows: list[Row]) -> list[TextTable]:
         " negative in contact. Least speed: factor of eqs. 3 and 4. Way: travelled along the path in 40 s."
     )
     title = "A person holds a hand beside the path or into it: medians"
-    return [medians(title, _COLUMNS, controller_named(rows), ("place", "controller"), note, names=2)]
+    return [medians(title, _COLUMNS, rows, ("place", "profile", "restrictions"), note, names=2)]
 
 
 def shown_cells(rows: list[Row]) -> list[Row]:

@@ -7,7 +7,7 @@ from pretouch.sim.hand import FACES, Push, Pusher, against
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.text_table import TextTable
 from pretouch.types import ControlStep
-from pretouch_lab.experiment import Context, Drawing, Experiment, controller_named, controllers, first_sensing, main
+from pretouch_lab.experiment import Context, Drawing, Experiment, controllers, first_sensing, main
 from pretouch_lab.options import Options
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, medians, rounded
@@ -99,7 +99,7 @@ def lowered_on_both_sides(step: ControlStep) -> bool:
 
 
 _COLUMNS = (
-    Column("profile", "controller"),
+    Column("profile\nmode", "profile", second="restrictions"),
     Column("both\never", "both_lowered", of="trials"),
     Column("both at\ntouch", "both_lowered_at_touch", of="contact"),
     Column("detected", "detected", of="contact"),
@@ -116,7 +116,7 @@ def tables(rows: list[Row]) -> list[TextTable]:
         " when it touched. Detected: of the pushes that touched. Filtered (eq. 8): along y, at detection."
     )
     title = "A person stands at +y and pushes the arm from -y: medians"
-    return [medians(title, _COLUMNS, controller_named(rows), ("controller",), note)]
+    return [medians(title, _COLUMNS, rows, ("profile", "restrictions"), note)]
 
 
 _FIGURE = Drawing("close-up", "Distances and thresholds with objects on both sides", first_sensing)

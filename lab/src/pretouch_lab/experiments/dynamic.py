@@ -8,7 +8,7 @@ from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import TextTable
 from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray
-from pretouch_lab.experiment import Context, Drawing, Experiment, controller_named, controllers, first_sensing, main
+from pretouch_lab.experiment import Context, Drawing, Experiment, controllers, first_sensing, main
 from pretouch_lab.options import Options
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, peak, rounded, summary, table
@@ -112,7 +112,7 @@ def _mean_force(record: Record, start: float, end: float) -> FloatArray:
 
 
 _COLUMNS = (
-    Column("profile", "controller"),
+    Column("profile\nmode", "profile", second="restrictions"),
     Column("detected", "detected", of="pushes"),
     Column("delay\n[ms]", "delay_s", 0, 1000.0),
     Column("direction\n[deg]", "direction_error_deg", 1),
@@ -124,12 +124,11 @@ _COLUMNS = (
 
 def tables(rows: list[Row]) -> list[TextTable]:
     """Show how the arm answered the pushes, those of all trials together."""
-    every = controller_named(rows)
-    pushes = [contact | {"controller": row["controller"], "pushes": 1} for row in every for contact in row["contacts"]]
-    of_pushes = summary(
-        pushes, ("controller",), ("delay_s", "direction_error_deg"), ("pushes", "detected", "reaction_towards_person")
-    )
-    of_trials = summary(every, ("controller",), ("peak_estimate_n",), ("false_detections",))
+    by = ("profile", "restrictions")
+    pushes = [row | contact | {"pushes": 1} for row in rows for contact in row["contacts"]]
+    counts = ("pushes", "detected", "reaction_towards_person")
+    of_pushes = summary(pushes, by, ("delay_s", "direction_error_deg"), counts)
+    of_trials = summary(rows, by, ("peak_estimate_n",), ("false_detections",))
     note = (
         "Pushes of 15 to 30 N for 0.2 to 0.5 s. Direction: between reaction and true force. Peak: of the estimate."
         " Towards person: pushes after which a reaction began against the push."

@@ -158,14 +158,13 @@ def shown_controllers(rows: list[Row]) -> tuple[float, dict[str, str], list[str]
     """Choose of many cells what to show in detail.
 
     Returns:
-        A stiffness [N/m], the restriction mode of each profile (`off` if it has cells with that), and the names of one
-        to three profiles, `blind` first and `pretouch` last.
+        A stiffness [N/m], the first restriction mode of each profile, and the names of one to three profiles, `blind`
+        first and `pretouch` last.
     """
     stiffnesses = [row["stiffness_n_per_m"] for row in rows]
     mode: dict[str, str] = {}
     for row in rows:
-        if row["restrictions"] == "off" or row["profile"] not in mode:
-            mode[row["profile"]] = row["restrictions"]
+        mode.setdefault(row["profile"], row["restrictions"])
     others = [name for name in mode if name not in ("blind", "pretouch")]
     shown = [name for name in ("blind", *others[:1], "pretouch") if name in mode]
     stiffness = _SHOWN_STIFFNESS if _SHOWN_STIFFNESS in stiffnesses else stiffnesses[0]
