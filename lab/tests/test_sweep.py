@@ -17,7 +17,18 @@ from pretouch_lab import sweep as sweeps
 from pretouch_lab.bench.dense_skin import UNITS, units_of
 from pretouch_lab.domain_randomisation import named_set
 from pretouch_lab.experiments import dynamic, static
-from pretouch_lab.sweep import UnitCount, dimension, found_in, setting, skin_of, sobol_indices, sweep_of, tables, trial
+from pretouch_lab.options import SweepOptions
+from pretouch_lab.sweep import (
+    UnitCount,
+    dimension,
+    results_of,
+    setting,
+    skin_of,
+    sobol_indices,
+    sweep_of,
+    tables,
+    trial,
+)
 
 X = {"plant.mass_error": "0:1", "plant.friction_compensated": "0:1", "sensing.reflectance": "0:1"}
 A, B, PI4 = 7.0, 0.1, np.pi**4
@@ -33,8 +44,12 @@ def ishigami(cell):
     return float(np.sin(x1) + A * np.sin(x2) ** 2 + B * x3**4 * np.sin(x1))
 
 
+def grid(arms):
+    return SweepOptions("static", "grid", arms=arms)
+
+
 def sobol(samples=4, arms=1, seeds="development"):
-    return sweep_of("static", X, {}, samples=samples, arms=arms, seeds=seeds)
+    return sweep_of(SweepOptions("static", samples=samples, arms=arms, seeds=seeds), X, {})
 
 
 def indices(samples):
@@ -43,7 +58,7 @@ def indices(samples):
 
 
 def test_a_grid_plays_each_combination_with_the_same_arms():
-    sweep = sweep_of("static", {"detect.f_base_n": "7:20:3", "scene.side": "-y,+y"}, {}, design="grid", arms=4)
+    sweep = sweep_of(grid(4), {"detect.f_base_n": "7:20:3", "scene.side": "-y,+y"}, {})
     arms = {}
     for cell, seed in sweep.plays():
         arms.setdefault(tuple(cell.values()), []).append(seed)
@@ -99,9 +114,9 @@ def test_what_does_not_vary_or_is_nowhere_has_no_indices(value):
 
 
 def test_the_course_over_a_grid():
-    sweep = sweep_of("static", X | {"plant.mass_error": "0:1:3"}, {}, design="grid", arms=2)
+    sweep = sweep_of(grid(2), X | {"plant.mass_error": "0:1:3"}, {})
     rows = [cell | {"seed": seed, "value": ishigami(cell)} for cell, seed in sweep.plays()]
-    found = found_in(sweep, rows, ["value"])
+    found = results_of(sweep, rows, ["value"])
     middle = [row["value"]["median"] for row in found["plant.mass_error"]]
     assert middle == pytest.approx([0.0, 0.0, 0.0])  # sin x1 is 0, and x2 is thrice at a root of the sine
     shown = tables(sweep, found, ["value"])

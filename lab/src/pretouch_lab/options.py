@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+import tyro
+
 from pretouch.cli.options import JsonFile, Numbers, Words
 
 
@@ -32,6 +34,26 @@ class Options:
     draws its own; by default the usual ones."""
     record: Literal["first", "all"] = "first"
     """first: record the trials of the first seed of which figures are drawn; all: record every trial."""
+
+
+@dataclass(frozen=True)
+class SweepOptions:
+    """What a sweep plays of an experiment, beside the parameters that it varies and fixes."""
+
+    experiment: tyro.conf.Positional[str] = tyro.MISSING
+    """static, avoidance or dynamic."""
+    design: Literal["grid", "sobol"] = "sobol"
+    """grid: all combinations. sobol: first-order and total indices."""
+    samples: int = 64
+    """Base points of Sobol indices, a power of two, each of which is parameters + 2 cells."""
+    arms: int = 16
+    """Simulated arms; each seed is another one, in another scene."""
+    metrics: Words = ()
+    """Numbers that table and figure show, separated by commas; by default all. The CSV file has all."""
+    profile: str = ""
+    """Profile to start from, or PROFILE:GROUP.FIELD=VALUE; by default the experiment's own."""
+    seeds: Literal["published", "development"] = "development"
+    """Which simulated arms: those of the published tables, or others."""
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,7 @@ from pretouch_lab.bench.dense_skin import spread_skin
 from pretouch_lab.bench.scenes import SeedRange, model, plant_of, scenario
 from pretouch_lab.domain_randomisation import named_set
 from pretouch_lab.experiment import Context, experiment
+from pretouch_lab.options import SweepOptions
 from pretouch_lab.run import Play, Row
 from pretouch_lab.table import Column, rounded, summary, table
 
@@ -204,7 +205,7 @@ def value_of(text: str) -> Value:
 
 
 @dataclass(frozen=True)
-class Sweep:
+class SweepPlan:
     """One sweep."""
 
     experiment: str
@@ -247,23 +248,21 @@ class Sweep:
         return plays
 
 
-def sweep_of(
-    name: str, vary: Mapping[str, str], fix: Mapping[str, str], profile_text: str = "", design: Design = "sobol",
-    samples: int = 64, arms: int = 16, seeds: SeedRange = "development",
-) -> Sweep:  # fmt: skip
-    """Read a sweep, given as on the command line. Raises an error of this package for what cannot be swept."""
+def sweep_of(options: SweepOptions, vary: Mapping[str, str], fix: Mapping[str, str]) -> SweepPlan:
+    """Read a sweep, with ranges and values as on the command line. Raises an error of this package."""
+    name, samples, arms = options.experiment, options.samples, options.arms
     if name not in EXPERIMENTS:
         raise ExperimentError(f"The experiment {name!r} cannot be swept: choose from {', '.join(EXPERIMENTS)}.")
     if not vary:
         raise ExperimentError("Nothing is varied: give --vary NAME=LOW:HIGH, detect.f_base_n=5:15 for one.")
     if both := [parameter for parameter in vary if parameter in fix]:
         raise ExperimentError(f"The parameter {both[0]} is both varied and fixed: do one of them.")
-    if design == "sobol" and (samples < 2 or samples & (samples - 1)):
+    if options.design == "sobol" and (samples < 2 or samples & (samples - 1)):
         raise ExperimentError(f"The number of samples is {samples}: give a power of two, 64 for one.")
-    first, last = _SEED_RANGES[seeds]
+    first, last = _SEED_RANGES[options.seeds]
     if not 1 <= arms <= last - first + 1:
         raise ExperimentError(f"The number of arms is {arms}: give 1 to {last - first + 1}.")
-    base = profile_text or EXPERIMENTS[name].profile
+    base = options.profile or EXPERIMENTS[name].profile
     dimensions = []
     for parameter, text in vary.items():
         group, _, field = parameter.partition(".")
@@ -271,7 +270,7 @@ def sweep_of(
         now = None if ":" not in text else at(usual, field, group) if usual else at(profile(base), parameter)
         dimensions.append(dimension(parameter, text, now))
     fixed = {parameter: value_of(text) for parameter, text in fix.items()}
-    return Sweep(name, base, tuple(dimensions), fixed, design, samples, range(first, first + arms))
+    return SweepPlan(name, base, tuple(dimensions), fixed, options.design, samples, range(first, first + arms))
 
 
 def problem(columns: list[Dimension]) -> dict[str, Any]:
@@ -302,14 +301,14 @@ def sobol_indices(columns: list[Dimension], numbers: Sequence[float | None]) -> 
     return [row | {key: rounded(answer[of][i], 4) for key, of in _INDICES.items()} for i, row in enumerate(rows)]
 
 
-def found_in(sweep: Sweep, rows: list[Row], metrics: Sequence[str]) -> dict[str, list[Row]]:
+def results_of(sweep: SweepPlan, rows: list[Row], metrics: Sequence[str]) -> dict[str, list[Row]]:
     """Return indices by metric, or over a grid the course by parameter, of rows in the order of the design."""
     if sweep.design == "sobol":
         return {metric: sobol_indices(sweep.columns, [row[metric] for row in rows]) for metric in metrics}
     return {one.name: summary(rows, [one.name], metrics) for one in sweep.vary}
 
 
-def tables(sweep: Sweep, results: dict[str, list[Row]], metrics: Sequence[str]) -> list[TextTable]:
+def tables(sweep: SweepPlan, results: dict[str, list[Row]], metrics: Sequence[str]) -> list[TextTable]:
     """Return a table for each metric of a Sobol design, or for each parameter of a grid."""
     fixed = "".join(f" {name} = {value}." for name, value in sweep.fixed.items())
     note = f"Profile {sweep.profile}, arms {sweep.seeds[0]} to {sweep.seeds[-1]}.{fixed}"

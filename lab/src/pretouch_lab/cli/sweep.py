@@ -5,42 +5,26 @@ import sys
 from collections import Counter
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal
 
 import tyro
 
-from pretouch.cli.options import Words
 from pretouch.errors import ExperimentError
-from pretouch_lab.options import Playing
+from pretouch_lab.options import Playing, SweepOptions
 
 
 @dataclass(frozen=True)
-class Sweep(Playing):
+class Sweep(Playing, SweepOptions):
     """Vary parameters of an experiment, and say which matter: over a grid, or by Sobol indices.
 
     A run that was stopped goes on with the same command. Needs the extra `sweep`.
     """
 
-    experiment: tyro.conf.Positional[str] = tyro.MISSING
-    """static, avoidance or dynamic."""
     vary: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Parameter and range: NAME=LOW:HIGH, NAME=LOW:HIGH:log, or NAME=VALUE,VALUE; for a grid NAME=LOW:HIGH:LEVELS.
     NAME is GROUP.FIELD of the profile, plant.FIELD, plant.kind, plant.world (a set of docs/how-to/sim-to-real.md),
     sensing.FIELD, skin.units or scene.FIELD. Give the option as often as there are parameters."""
     fix: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Parameter that has another value throughout: NAME=VALUE."""
-    design: Literal["grid", "sobol"] = "sobol"
-    """grid: all combinations. sobol: first-order and total indices."""
-    samples: int = 64
-    """Base points of Sobol indices, a power of two, each of which is parameters + 2 cells."""
-    arms: int = 16
-    """Simulated arms; each seed is another one, in another scene."""
-    metrics: Words = ()
-    """Numbers that table and figure show, separated by commas; by default all. The CSV file has all."""
-    profile: str = ""
-    """Profile to start from, or PROFILE:GROUP.FIELD=VALUE; by default the experiment's own."""
-    seeds: Literal["published", "development"] = "development"
-    """Which simulated arms: those of the published tables, or others."""
 
     def run(self) -> None:
         """Play what is missing, with tables and figure."""
@@ -48,10 +32,10 @@ class Sweep(Playing):
         from pretouch.cli.writing import numbers_to, unwritable_said
         from pretouch_lab.cli.playing import begin, played, report
         from pretouch_lab.domain_randomisation import named_set
-        from pretouch_lab.sweep import EXPERIMENTS, SWEEP, found_in, sobol_figure, sweep_of, tables, trial
+        from pretouch_lab.sweep import EXPERIMENTS, SWEEP, results_of, sobol_figure, sweep_of, tables, trial
 
         vary, fix = self._pairs("vary", self.vary), self._pairs("fix", self.fix)
-        sweep = sweep_of(self.experiment, vary, fix, self.profile, self.design, self.samples, self.arms, self.seeds)
+        sweep = sweep_of(self, vary, fix)
         metrics = self.metrics or EXPERIMENTS[sweep.experiment].metrics
         if wrong := [name for name in metrics if name not in EXPERIMENTS[sweep.experiment].metrics]:
             names = ", ".join(EXPERIMENTS[sweep.experiment].metrics)
@@ -66,7 +50,7 @@ class Sweep(Playing):
             for reason, count in Counter(row["failed"] for row in rows if row["failed"]).items():
                 again = "Take their lines out of rows.jsonl to try again."
                 print(f"{count} cells failed: {reason} {again}", file=sys.stderr)
-            results, place = found_in(sweep, rows, metrics), out / f"{sweep.experiment}.csv"
+            results, place = results_of(sweep, rows, metrics), out / f"{sweep.experiment}.csv"
             figures = [(sweep.experiment, "Sobol indices", sobol_figure(results))] if sweep.design == "sobol" else []
             report(tables(sweep, results, metrics), figures, out)
             with unwritable_said("file", place), place.open("w", newline="", encoding="utf-8") as file:

@@ -181,7 +181,7 @@ class Reward:
 class ReachEnv(gymnasium.Env):  # type: ignore[misc]  # not followed, see pyproject
     """A simulated Panda with a skin reaches three goals on the path of a scenario.
 
-    `observation.Interface` tells what is observed, and what an action between -1 and 1 asks for. The action is stamped
+    `Interface` tells what is observed, and what an action between -1 and 1 asks for. The action is stamped
     by the step it was observed at, and counts from the control cycle after it. `reset(seed=n)` gives the arm, person
     and noise of trial n of the benchmark; without a seed others are drawn. An episode is terminated by its third goal
     held or by too large a force, and truncated after 12 s. `info` has `contacts`, `peak_force_n`, `goals`, and of the
