@@ -106,10 +106,13 @@ class Record:
         """
         return [(s, _first_velocity(self.steps[i:])) for i, s in enumerate(self.steps) if s.contact is not None]
 
+    def started(self) -> int:
+        """Index of the first step in which the arm does not hold, as it does while its window fills."""
+        return next((i for i, s in enumerate(self.steps) if s.mode is not Mode.HOLD), len(self.steps))
+
     def held(self) -> bool:
         """Whether the arm held for another reason than filling its window at the start."""
-        start = next((i for i, s in enumerate(self.steps) if s.mode is not Mode.HOLD), len(self.steps))
-        return any(s.mode is Mode.HOLD for s in self.steps[start:])
+        return any(s.mode is Mode.HOLD for s in self.steps[self.started() :])
 
 
 def _first_velocity(steps: list[ControlStep]) -> FloatArray:

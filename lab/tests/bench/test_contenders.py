@@ -43,7 +43,7 @@ def test_an_unknown_switch_is_an_error_and_not_left_out():
         Contender("own", "pretouch:detect.lern=no", "scale").profile  # noqa: B018  # it reads the text
 
 
-def test_contenders_and_their_other_tunings_are_profiles():
+def test_contenders_are_profiles():
     for name in (*AVOIDANCE, *ABLATED):
         assert profile(profile_text(name))
     assert profile(profile_text("paper-off")).approach is None

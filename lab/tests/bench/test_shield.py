@@ -116,9 +116,9 @@ def test_rows_keep_what_was_not_seen_apart():
     at_person, tracking = groups = shield.results([*rows, row("tracking", error=1.0)])
     assert (at_person["trials"], at_person["steps"], at_person["limit_violations"]) == (2, 200, 2)
     assert (at_person["touches"], at_person["touch_speed_m_s"], at_person["over_bound"]) == (3, 0.3, 1)
-    assert (at_person["close_touches"], at_person["unseen_touches"]) == (2, 1)
     assert at_person["excess_m_s"] == pytest.approx(0.2206, abs=1e-4)
-    assert (at_person["unseen_touch_speed_m_s"], at_person["least_distance_m"]) == (0.7, -0.01)
+    assert (at_person["unseen_touches"], at_person["unseen_touch_speed_m_s"]) == (1, 0.7)
+    assert at_person["least_distance_m"] == -0.01
     assert at_person["intervention"] == pytest.approx(0.2, abs=1e-4)
     assert at_person["task_error"] is None
     assert (tracking["task_error"], tracking["touch_speed_m_s"]) == (0.1, None)

@@ -40,7 +40,8 @@ class FixedBounds(Detector, name="fixed"):
         measured, W = None if robot.wrench is None else robot.wrench[:3], np.empty((3, body.model.n))
         force_map_into(body.model.ee_jacobian(sample.kin), W)
         force = W @ robot.tau_ext if measured is None else measured
-        share, bands = self.share(robot.tau_ext, measured), bands_of(np.full(3, self.force_n))
+        share, zero, band = self.share(robot.tau_ext, measured), np.zeros(3), np.full(3, self.force_n)
+        bands = Thresholds(band, -band, zero, np.full(3, np.nan), zero, zero)  # of a spread that nobody knows
         contact = strongest(force, bands) if share >= 1.0 and sample.armed else None
         return Detection(bands, contact, sample.armed, robot.tau_ext, share), None
 
@@ -57,12 +58,6 @@ class FixedBounds(Detector, name="fixed"):
     def largest_missed_n(self, body: Body, speed: float) -> float:
         """The bound on the force."""
         return self.force_n
-
-
-def bands_of(band: FloatArray) -> Thresholds:
-    """Bands (3,) about no force, of a spread that nobody knows."""
-    none = np.zeros(3)
-    return Thresholds(*np.array([band, -band, none, np.full(3, np.nan), none, none]))
 
 
 OBSERVER_NM = (3.2, 5.2, 3.2, 4.0, 1.8, 1.1, 1.4)

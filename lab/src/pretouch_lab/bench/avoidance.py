@@ -25,21 +25,6 @@ PAIRED = (
     ("person", "paper", "cycle_time_s"),
 )
 """Families with the references and measures that the goals of `pretouch` are about."""
-_SPREAD = (
-    "least_distance_m",
-    "true_peak_20ms_n",
-    "clamping_force_n",
-    "peak_estimate_n",
-    "impact_speed_m_s",
-    "first_contact_s",
-    "cycle_time_s",
-    "tracking_rms_m",
-    "speed_m_s",
-    "jerk_rms_rad_s3",
-    "held_s",
-    "livelock_s",
-)
-"""Measures of which median and 10-90 % over the seeds are given; a trial without one is left out."""
 _TOTALS = ("contact", "holds", "livelocks", "reactions", "false_reactions", "towards_person")
 _NOTE = (
     "Medians over the seeds, 10-90 % below. hit: trials with contact. least: least true distance of the surfaces."
@@ -79,6 +64,23 @@ _ABLATED = (
     Column("holds", "holds"),
     Column("livelocks", "livelocks"),
 )
+_LESS = (
+    Column("true 20 ms [N]", "true_peak_20ms_n", 1),
+    Column("clamp [N]", "clamping_force_n", 1),
+    Column("turn [s]", "cycle_time_s", 1),
+    Column("off path rms [mm]", "tracking_rms_m", 0, 1e3),
+    Column("jerk rms [rad/s^3]", "jerk_rms_rad_s3", 0),
+    Column("held [s]", "held_s", 1),
+    Column("livelock [s]", "livelock_s", 1),
+)
+_MORE = (
+    Column("least distance [mm]", "least_distance_m", 0, 1e3),
+    Column("along the path [mm/s]", "speed_m_s", 0, 1e3),
+)
+_NOTICED = 0.05
+"""Part of the larger of two values by which they have to differ."""
+_SPREAD = tuple({column.key: 0 for column in (*_COLUMNS, *_ABLATED, *_LESS, *_MORE) if column.digits is not None})
+"""Measures of which median and 10-90 % over the seeds are given; a trial without one is left out."""
 
 
 def plays(seeds: SeedRange, quick: bool, contenders: Sequence[str] = (), names: Sequence[str] = ()) -> list[Play]:
@@ -184,23 +186,6 @@ def tables(summary: Row) -> list[TextTable]:
         table("Each switch of pretouch off alone, in the closed loop", _ABLATED, by_scene, note, 2),
     ]
     return [each for each in every if each.rows]
-
-
-_LESS = (
-    Column("true 20 ms [N]", "true_peak_20ms_n", 1),
-    Column("clamp [N]", "clamping_force_n", 1),
-    Column("turn [s]", "cycle_time_s", 1),
-    Column("off path rms [mm]", "tracking_rms_m", 0, 1e3),
-    Column("jerk rms [rad/s^3]", "jerk_rms_rad_s3", 0),
-    Column("held [s]", "held_s", 1),
-    Column("livelock [s]", "livelock_s", 1),
-)
-_MORE = (
-    Column("least distance [mm]", "least_distance_m", 0, 1e3),
-    Column("along the path [mm/s]", "speed_m_s", 0, 1e3),
-)
-_NOTICED = 0.05
-"""Part of the larger of two values by which they have to differ."""
 
 
 def losses(cells: list[Row]) -> TextTable:

@@ -32,7 +32,7 @@ _LOOK_EVERY = 10
 def measured(record: Record, setting: Setting, scenario: Scenario) -> Row:
     """Return all measures of a trial."""
     setup, params, hands = setting.setup, scenario.params, record.hand_position
-    model, steps, begin = setup.model, record.steps, started(record.steps)
+    model, steps, begin = setup.model, record.steps, record.started()
 
     def towards(i: int) -> FloatArray:
         return nearest(model.kinematics(steps[i].q), model.body, setting.shape(hands[i])).direction
@@ -50,11 +50,6 @@ def measured(record: Record, setting: Setting, scenario: Scenario) -> Row:
         "timed": "turns" in params,
         "duration_s": round(steps[-1].stamp, 3),
     }
-
-
-def started(steps: list[ControlStep]) -> int:
-    """Index of the first step in which the arm does not hold, as it does while its window fills."""
-    return next((i for i, s in enumerate(steps) if s.mode is not Mode.HOLD), len(steps))
 
 
 def contact(record: Record, near: BoolArray, towards: Callable[[int], FloatArray]) -> Row:
@@ -79,7 +74,7 @@ def contact(record: Record, near: BoolArray, towards: Callable[[int], FloatArray
         return row
     within = times[near]
     if len(within) and within[0] <= touch:
-        row["first_contact_s"] = rounded(touch - max(float(within[0]), float(times[started(record.steps)])))
+        row["first_contact_s"] = rounded(touch - max(float(within[0]), float(times[record.started()])))
     at = max(0, int(np.searchsorted(times, touch)) - 1)
     direction = towards(at)
     estimate = -record.forces() @ direction
@@ -167,7 +162,7 @@ def livelocks(record: Record, setting: Setting, limits: dict[str, Any] | None) -
     """
     if limits is None:
         return {"livelocks": None, "livelock_s": None}
-    chosen = range(started(record.steps), len(record.steps), _LOOK_EVERY)
+    chosen = range(record.started(), len(record.steps), _LOOK_EVERY)
     if len(chosen) < 2:
         return {"livelocks": 0, "livelock_s": 0.0}
     phase, time = np.array([(record.steps[i].path_phase, record.steps[i].stamp) for i in chosen]).T

@@ -38,8 +38,6 @@ SEEN_S = 0.4
 """How long the touching part has to have been known to be near [s]: latency and what a row takes, at its rate of
 tightening, from the fastest approach that the braking curve leaves at its greatest distance (0.06 s + 0.8 / 3 s), and
 two readings."""
-CLOSE_M = 0.02
-"""By how much it may be thought farther than it is to be seen well [m]: what the VL53L1X's data sheet allows."""
 SAME_M = 0.1
 """How near to the touching place of the arm a sensed point's closest point has to be [m]."""
 TOLERANCE = 1e-9
@@ -237,11 +235,7 @@ def results(rows: Iterable[Row]) -> list[Row]:
         touches = [touch for trial in trials for touch in trial["touches"]]
         seen = [touch for touch in touches if touch["mistaken_m"] is not None]
         excess = [touch["speed_m_s"] - speed_bound(touch["mistaken_m"]) for touch in seen]
-        kinds = {
-            "": seen,
-            "close_": [touch for touch in seen if touch["mistaken_m"] <= CLOSE_M],
-            "unseen_": [touch for touch in touches if touch["mistaken_m"] is None],
-        }
+        kinds = {"": seen, "unseen_": [touch for touch in touches if touch["mistaken_m"] is None]}
         row = {
             "trials": len(trials),
             "steps": steps,
@@ -272,8 +266,6 @@ _COLUMNS = (
     Column("seen: over\nthe bound", "over_bound", of="touches"),
     Column("by\n[m/s]", "excess_m_s", 2),
     Column("fastest\n[m/s]", "touch_speed_m_s", 2),
-    Column("seen to\n2 cm", "close_touches"),
-    Column("fastest\n[m/s]", "close_touch_speed_m_s", 2),
     Column("unseen", "unseen_touches"),
     Column("fastest\n[m/s]", "unseen_touch_speed_m_s", 2),
     Column("least\n[mm]", "least_distance_m", 0, 1e3),
@@ -289,7 +281,7 @@ def tables(groups: list[Row]) -> list[TextTable]:
         f" each step of the {SEEN_S:g} s before the touch the controller knew a point whose closest point on the body"
         f" lay within {100 * SAME_M:.0f} cm of the touching place. The bound is the speed that the braking curve leaves"
         " where that was thought farther than it was, and what the drives are off by:"
-        f" {speed_bound(0.01):.2f} m/s at 1 cm, {speed_bound(CLOSE_M):.2f} at 2 cm, {speed_bound(0.05):.2f} at 5 cm."
+        f" {speed_bound(0.01):.2f} m/s at 1 cm, {speed_bound(0.02):.2f} at 2 cm, {speed_bound(0.05):.2f} at 5 cm."
         " Where nothing was seen no filter can know. least: least true distance. off: rms distance of the hand from"
         " where the ordinary commander wants it. change: rms of how far the command at the end-effector is from what"
         " was asked."
