@@ -63,7 +63,7 @@ def scenarios() -> dict[str, Scenario]:
     """Return all scenarios by their names; a file that was changed since is an ExperimentError."""
     every: dict[str, Scenario] = {}
     for family in FAMILIES:
-        shared = scenario(f"avoidance-{family}")
+        shared = dict(scenario(f"avoidance-{family}"))
         for variant in shared.pop("variant"):
             own = {  # of a table only what the variant names
                 key: shared[key] | value if isinstance(shared.get(key), dict) else value
