@@ -1,7 +1,7 @@
 """One trial: an arm in a scene under the controller, and everything it left behind."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from itertools import takewhile
 from pathlib import Path as FilePath
@@ -150,19 +150,6 @@ class _Recorder:
         return truth_of(forces, touches, self.hand_position[-1])
 
 
-@contextmanager
-def _recording(setup: Setup, controller: Controller) -> Iterator[Recording | None]:
-    """Open the recording of a trial, if there is to be one. One that could not be kept whole is a RecordingError."""
-    if setup.recording is None:
-        yield None
-        return
-    about = {"seed": setup.seed, "scene": described(setup.scene), **({"world": setup.world} if setup.world else {})}
-    with Recording(setup.recording, controller, about) as recording:
-        yield recording
-    if recording.trouble:
-        raise RecordingError(recording.trouble)
-
-
 class Simulation:
     """The arm of a setup in its scene under its controller: it stands, and its observer's transient is over."""
 
@@ -192,13 +179,17 @@ class Simulation:
 
 
 def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
-    """Run a trial until `done` says so of a step."""
+    """Run a trial until `done` says so of a step. A recording that could not be kept whole is a RecordingError."""
     made = Simulation(setup)
-    plant = made.plant
-    with _recording(setup, made.controller) as recording:
+    plant, about = made.plant, {"seed": setup.seed, "scene": described(setup.scene)}
+    if setup.world:
+        about["world"] = setup.world
+    with Recording(setup.recording, made.controller, about) if setup.recording else nullcontext() as recording:
         recorder = _Recorder(plant, made.hand, recording)
         options = Options(desired=setup.commander(plant, made.hand)) if setup.commander else None
         made.run(recorder, lambda step: done(step, plant), options)
+    if recording and recording.trouble:
+        raise RecordingError(recording.trouble)
     return Record(
         recorder.steps,
         np.array([t for t, _ in plant.true_log]),
