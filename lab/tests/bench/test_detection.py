@@ -1,5 +1,5 @@
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cache
 from itertools import pairwise
 
@@ -22,15 +22,14 @@ from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
 from pretouch.types import Contact, RobotState, Thresholds, no_obstacles
 from pretouch_lab.bench import contacts, detection
 from pretouch_lab.bench import free as free_motion
-from pretouch_lab.bench.contacts import ContactCell, Toucher, Touching, contact_cells, plan
+from pretouch_lab.bench.contacts import Toucher, Touching, plan
 from pretouch_lab.bench.contenders import DETECTORS, Contender, ablated
 from pretouch_lab.bench.detection import BUSY, matched, plays, rows_of, sweep_values, towards, trial
 from pretouch_lab.bench.detection_results import delays, rate, results
 from pretouch_lab.bench.detection_tables import reached, tables
-from pretouch_lab.bench.free import FreeCell, free_cells, free_stream
-from pretouch_lab.bench.hard import hard_cells
+from pretouch_lab.bench.free import free_stream
 from pretouch_lab.bench.replays import REST, Steps, alarms_of, begun
-from pretouch_lab.bench.scenes import model
+from pretouch_lab.bench.scenes import Arm, model
 from pretouch_lab.bench.streams import AWAY, StreamRecorder
 from pretouch_lab.replay import DetectorAlone, FirstMotion, Ghost
 
@@ -224,9 +223,8 @@ def test_the_hand_comes_rests_on_the_point_and_withdraws():
 
 
 def test_planned_contacts_leave_time_for_a_reaction_and_lie_on_the_surface():
-    cell = ContactCell("nominal", "nominal", 0.3, 1000, 12)
-    touches = plan(cell, 0.05)
-    assert [t.start for t in touches] == [t.start for t in plan(cell, 0.05)]
+    touches = plan(12, 0.05, 1000)
+    assert [t.start for t in touches] == [t.start for t in plan(12, 0.05, 1000)]
     assert all(b.start - a.end >= 2.6 for a, b in pairwise(touches))
     for touch in touches:
         own = model().capsules.of_links(np.array([touch.link]))
@@ -238,10 +236,15 @@ def test_planned_contacts_leave_time_for_a_reaction_and_lie_on_the_surface():
 
 
 def test_a_quick_run_is_a_part_of_the_full_one():
-    for cells in (free_cells, contact_cells, hard_cells):
-        full = {(cell.name, cell.seed) for cell in cells("development", False)}
-        assert len({seed for _, seed in full}) == len(full)
-        assert {(cell.name, cell.seed) for cell in cells("development", True)} < full
+    names = ("family", "kind", "sensing", "path", "speed_m_s", "near")
+    quick, full = (
+        {(*(arm[name] for name in names), seed): arm["ablated"] for arm, seed in plays("development", which)}
+        for which in (True, False)
+    )
+    assert len({(family, seed) for family, *_, seed in full}) == len(full) == 60 + 35 + 72 + 18
+    assert quick.items() < full.items()
+    assert sum(full.values()) == 2 * 5 + 8
+    assert {arm["family"] for arm, _ in plays("development", True, "stress")} == {"free", "contacts"}
 
 
 def test_a_rate_has_the_bounds_of_a_poisson_count():
@@ -269,14 +272,10 @@ def test_every_baseline_is_a_profile_with_its_own_value_on_its_curve():
 def test_a_run_leaves_rows_for_every_detector(monkeypatch):
     for module in (detection, free_motion):
         monkeypatch.setattr(module, "warm_up_s", lambda: 1.5)
-    free, seven = (
-        FreeCell("nominal", "circle", 0.3, "standing", 1000, 1.0),
-        ContactCell("nominal", "seven", 0.3, 1000, 1),
-    )
-    every = {("free", free.name): free, ("contacts", seven.name): seven}
-    monkeypatch.setattr(detection, "arms", lambda *_: every)
     monkeypatch.setattr(contacts, "plan", lambda *_: [touching(1.8)])
-    rows = rows_of([cell | trial("development", True, "", cell, seed) for cell, seed in plays(every)])
+    free = Arm("free", sensing="seven", speed_m_s=0.3, near="standing", counted_s=1.0, ablated=True)
+    pushed = Arm("contacts", sensing="seven", speed_m_s=0.3, near="touched", count=1)
+    rows = rows_of([cell | trial(cell, 1000) for cell in (asdict(pushed), asdict(free))])
     assert [row["family"] for row in rows[:2]] == ["free", "free"]
     assert len(rows) == 2 * len(DETECTORS) + len(ablated())  # the contacts are not those that ablations are given
     contact = next(row for row in rows if row["family"] == "contacts")["contacts"][0]
@@ -292,11 +291,11 @@ def test_a_run_leaves_rows_for_every_detector(monkeypatch):
 
 
 def test_arms_that_nobody_is_near_move_alike_without_units(monkeypatch):
-    free = FreeCell("nominal", "circle", 0.3, "nothing", 1000, 1.0)
+    free = Arm("free", sensing="seven", speed_m_s=0.3, counted_s=1.0)
     monkeypatch.setattr(free_motion, "warm_up_s", lambda: 0.0)
-    made = free_stream(free)
-    monkeypatch.setattr(free_motion, "_bystander", lambda _: lambda _: AWAY)
-    seen = free_stream(replace(free, near="standing"))
+    made = free_stream(free, 1000)
+    monkeypatch.setattr(free_motion, "_bystander", lambda *_: lambda _: AWAY)
+    seen = free_stream(replace(free, near="standing"), 1000)
     assert not seen.count.any()
     np.testing.assert_array_equal(made.watched, seen.watched)
     for name, numbers in made.robot.items():

@@ -10,17 +10,19 @@ from lab.tests.bench.wandering import WanderingController
 
 from pretouch_lab.bench import hard
 from pretouch_lab.bench.contenders import DETECTORS
+from pretouch_lab.bench.detection import plays
 from pretouch_lab.bench.detection_results import HARD, UNTOLD, arms_of, hard_rows
-from pretouch_lab.bench.hard import HardCell, hard_cells, hard_stream
+from pretouch_lab.bench.hard import hard_stream
 from pretouch_lab.bench.motions import motion_of
-from pretouch_lab.bench.scenes import model, scenario
+from pretouch_lab.bench.scenes import Arm, model, scenario
 from pretouch_lab.bench.streams import record
 
 
 def test_each_hard_motion_is_long_enough_to_show_that_its_goal_is_reached():
     seconds = Counter()
-    for cell in hard_cells("published", quick=False):
-        seconds[cell.motion] += cell.counted_s if cell.near != "touched" else 0.0
+    for arm, _ in plays("published", quick=False):
+        if arm["family"] == "hard" and arm["near"] != "touched":
+            seconds[arm["path"]] += arm["counted_s"]
     del seconds[UNTOLD]
     goal = scenario("hard")["goal"]
     assert len(seconds) == 6
@@ -50,15 +52,15 @@ def test_a_hard_motion_is_within_the_limits_and_as_fast_as_it_says(name):
 
 @pytest.mark.slow
 def test_a_hard_arm_moves_and_sees_without_a_controller_as_with_one(monkeypatch):
-    cell = HardCell("pick-and-place", "standing", 1003, 1.0)
-    (made, _), (alone, _) = hard_stream(cell, True), hard_stream(replace(cell, near="nothing"), True)
+    arm = Arm("hard", path="pick-and-place", near="standing", counted_s=1.0)
+    (made, _), (alone, _) = hard_stream(arm, 1003), hard_stream(replace(arm, near="nothing"), 1003)
     assert made.stamp[-1] == pytest.approx(61.0, abs=0.05)
 
     def by_controller(what, prepare, command):
         return record(replace(what, controller=partial(WanderingController, command.__self__)), prepare)
 
     monkeypatch.setattr(hard, "record_moved", by_controller)
-    controlled, _ = hard_stream(cell, True)
+    controlled, _ = hard_stream(arm, 1003)
     assert made.count.max() > 0
     np.testing.assert_array_equal(made.watched, controlled.watched)
     np.testing.assert_array_equal(made.count, controlled.count)
@@ -71,7 +73,14 @@ def test_a_hard_arm_moves_and_sees_without_a_controller_as_with_one(monkeypatch)
 
 def test_rows_are_by_motion_and_loads_that_nobody_announced_are_apart():
     def free(motion, near, alarms):
-        named = {"family": "hard", "contender": "pretouch", "motion": motion, "near": near}
+        named = {
+            "family": "hard",
+            "contender": "pretouch",
+            "path": motion,
+            "near": near,
+            "kind": "nominal",
+            "speed_m_s": 0.0,
+        }
         return named | {"hours": 1.0, "alarms": alarms}
 
     touch = {"seen": True, "delay_s": 0.03, "towards": False, "detectable": True, "force_n": 20.0, "duration_s": 0.3}

@@ -10,7 +10,7 @@ from pretouch.robot.postures import brought_to
 from pretouch.sim.plant import Plant, PointForce
 from pretouch.types import FloatArray
 from pretouch_lab.bench.dense_skin import gap, surface
-from pretouch_lab.bench.scenes import SeedRange, model, numbered, path_of, plant_of, scenario, sensing_of
+from pretouch_lab.bench.scenes import Arm, model, path_of, plant_of, scenario, sensing_of
 from pretouch_lab.bench.streams import AWAY, Alone, Stream, record
 
 _TRIES = 400
@@ -57,41 +57,12 @@ class Touching:
         return self.start + self.rise_s * of_n / self.force_n
 
 
-@dataclass(frozen=True)
-class ContactCell:
-    """One arm, touched again and again."""
-
-    kind: str
-    sensing: str
-    speed_m_s: float
-    seed: int
-    count: int
-    """Contacts."""
-    world: str = ""
-    """Set of the domain randomisation of which the seed draws one, or none."""
-
-    @property
-    def name(self) -> str:
-        """Name for files."""
-        return f"{self.kind}_{self.sensing}_{self.speed_m_s:g}_{self.seed:04d}"
-
-
-def contact_cells(seeds: SeedRange, quick: bool) -> list[ContactCell]:
-    """Return the cells of the scenario file."""
-    family = scenario("contacts")
-    count = family["contact"]["quick" if quick else "full"]
-    return [
-        ContactCell(cell["kind"], cell["sensing"], cell["speed_m_s"], seed, count)
-        for cell, seed in numbered(family, family["cell"], seeds, quick)
-    ]
-
-
-def plan(cell: ContactCell, hand_radius: float) -> list[Touching]:
-    """Draw a cell's contacts: the seed says where, how and when."""
-    family, rng = scenario("contacts"), np.random.default_rng([cell.seed, 32])
+def plan(number: int, hand_radius: float, seed: int) -> list[Touching]:
+    """Draw so many contacts: the seed says where, how and when."""
+    family, rng = scenario("contacts"), np.random.default_rng([seed, 32])
     at, touches = float(family["duration"]["warm_up_s"]), list[Touching]()
     q = brought_to(model(), path_of("rest").point(0.0))  # where the paths begin
-    for _ in range(cell.count):
+    for _ in range(number):
         touches.append(touching(family["contact"], q, at, hand_radius, rng))
         at = touches[-1].end + rng.uniform(*family["duration"]["gap_s"])
     return touches
@@ -187,13 +158,13 @@ class Toucher:
         return np.asarray(origin + rotation @ (touch.point + (touch.hand_radius + off) * touch.normal))
 
 
-def contact_stream(cell: ContactCell) -> tuple[Stream, list[Touching]]:
+def contact_stream(arm: Arm, seed: int) -> tuple[Stream, list[Touching]]:
     """Let an arm be touched; return its stream and its contacts."""
-    sensing = sensing_of(cell.sensing, cell.seed)
-    touches = plan(cell, sensing.hand_radius)
+    sensing = sensing_of(arm.sensing, seed)
+    touches = plan(arm.count, sensing.hand_radius, seed)
     what = Alone(
-        path_of("circle" if cell.speed_m_s > 0 else "rest"), cell.speed_m_s, plant_of(cell.kind), sensing,
-        sensing.hand_radius, cell.seed, last_s(touches), cell.world,
+        path_of("circle" if arm.speed_m_s > 0 else "rest"), arm.speed_m_s, plant_of(arm.kind), sensing,
+        sensing.hand_radius, seed, last_s(touches), arm.world,
     )  # fmt: skip
     return record(what, lambda plant: Toucher(plant, touches).hand), touches
 

@@ -3,20 +3,20 @@
 In free motion alarms are counted; on arms that are touched they are matched with the contacts that caused them.
 """
 
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterator
 from dataclasses import asdict, replace
-from functools import cache
 from typing import Any
 
 import numpy as np
 
 from pretouch.types import FloatArray
-from pretouch_lab.bench.contacts import ContactCell, Touching, contact_cells, contact_stream
+from pretouch_lab.bench.contacts import Touching, contact_stream
 from pretouch_lab.bench.contenders import DETECTORS, Contender, ablated
-from pretouch_lab.bench.free import FreeCell, free_cells, free_stream, warm_up_s
-from pretouch_lab.bench.hard import HardCell, hard_cells, hard_stream
+from pretouch_lab.bench.free import free_stream, warm_up_s
+from pretouch_lab.bench.hard import hard_stream
 from pretouch_lab.bench.replays import PERIOD_S, REST, Replayed, Steps, alarms_of
-from pretouch_lab.bench.scenes import SeedRange, model, scenario
+from pretouch_lab.bench.scenes import Arm, SeedRange, model, numbered, scenario
 from pretouch_lab.bench.streams import Stream
 from pretouch_lab.run import Cell, Play, Row
 from pretouch_lab.table import rounded
@@ -29,67 +29,70 @@ BUSY = -1.0
 Match = tuple[float | None, int | None]
 """Delay [s] of the first alarm a contact caused, and the step of that alarm: (None, None) of a missed contact, (BUSY,
 None) where an earlier alarm was still being answered."""
-Arm = FreeCell | ContactCell | HardCell
 
 
-@cache
-def arms(seeds: SeedRange, quick: bool, world: str = "") -> dict[tuple[str, str], Arm]:
-    """Return the arms by family and name; those of the family hard have a world of their own: with another are none."""
-    cells: dict[str, Iterable[Arm]] = {
-        "free": [replace(cell, world=world) for cell in free_cells(seeds, quick)],
-        "contacts": [replace(cell, world=world) for cell in contact_cells(seeds, quick)],
-        "hard": [] if world else hard_cells(seeds, quick),
-    }
-    return {(family, cell.name): cell for family in FAMILIES for cell in cells[family]}
+def plays(seeds: SeedRange, quick: bool, world: str = "") -> list[Play]:
+    """Return the arms to play, the long ones of contacts first; with another world than their own none are hard."""
+    hard = [] if world else _hard(seeds, quick)
+    arms = [*hard, *_contacts(seeds, quick, world), *_free(seeds, quick, world)]
+    return [(asdict(arm), seed) for arm, seed in arms]
 
 
-def plays(every: dict[tuple[str, str], Arm]) -> list[Play]:
-    """Return the arms to play, the long ones of contacts first."""
-    order = sorted(every, key=lambda key: -FAMILIES.index(key[0]))
-    return [({"family": family, "name": name}, every[family, name].seed) for family, name in order]
+def _free(seeds: SeedRange, quick: bool, world: str) -> Iterator[tuple[Arm, int]]:
+    family, goal, entries = scenario("free"), scenario("contacts")["goal"], Counter[int]()
+    counted = family["duration"]["quick_s" if quick else "full_s"]
+    for entry, seed in numbered(family, family["arm"], seeds, quick):
+        entries[id(entry)] += 1
+        usual = entry["kind"] == "nominal" and entry["speed_m_s"] == goal["speed_m_s"]
+        ablated = usual and entries[id(entry)] <= ABLATED_ARMS
+        where = {name: entry[name] for name in ("kind", "path", "speed_m_s", "near")}
+        yield Arm("free", **where, sensing="seven", counted_s=counted, ablated=ablated, world=world), seed
 
 
-def trial(seeds: SeedRange, quick: bool, world: str, cell: Cell, _seed: int) -> Row:
+def _contacts(seeds: SeedRange, quick: bool, world: str) -> Iterator[tuple[Arm, int]]:
+    family = scenario("contacts")
+    count = family["contact"]["quick" if quick else "full"]
+    for entry, seed in numbered(family, family["cell"], seeds, quick):
+        kind, sensing, speed = entry["kind"], entry["sensing"], entry["speed_m_s"]
+        ablated = (kind, sensing, speed) == ("nominal", "nominal", family["goal"]["speed_m_s"])
+        path = "circle" if speed > 0 else "rest"
+        yield Arm("contacts", kind, sensing, path, speed, "touched", count=count, ablated=ablated, world=world), seed
+
+
+def _hard(seeds: SeedRange, quick: bool) -> Iterator[tuple[Arm, int]]:
+    family, size = scenario("hard"), "quick" if quick else "full"
+    counted, count = family["duration"][f"{size}_s"], family["contact"][size]
+    spent = float(count * (np.mean(family["contact"]["gap_s"]) + np.mean(family["contact"]["durations_s"])))
+    entries = [*family["cell"], *({**entry, "near": "touched"} for entry in family["touched"])]
+    for entry, seed in numbered(family, entries, seeds, quick):
+        touched, arm = entry["near"] == "touched", Arm("hard", path=entry["motion"], near=entry["near"])
+        yield replace(arm, counted_s=spent if touched else counted, count=count if touched else 0), seed
+
+
+def trial(cell: Cell, seed: int) -> Row:
     """Simulate an arm, and give what it said to one detector after the other."""
-    every = arms(seeds, quick, world)
-    arm = every[cell["family"], cell["name"]]
-    stream, touches = streamed(arm, quick)
+    arm = Arm(**cell)
+    stream, touches = streamed(arm, seed)
     steps = Steps(stream, model())
 
     def judged(contender: Contender) -> Row:
         return judged_contacts(steps, touches, contender) if touches else judged_free(steps, contender)
 
-    judgements = [{"contender": one.name, **judged(one)} for one in contenders_of(arm, every.values())]
-    return {"arm": asdict(arm), "detectors": judgements}
+    contenders = (*DETECTORS, *ablated()) if arm.ablated else DETECTORS
+    return {"detectors": [{"contender": one.name, **judged(one)} for one in contenders]}
 
 
 def rows_of(played: list[Row]) -> list[Row]:
     """Return a row for each arm and detector."""
-    return [
-        {"family": row["family"], "name": row["name"], **row["arm"], **one}
-        for row in sorted(played, key=lambda row: FAMILIES.index(row["family"]))
-        for one in row["detectors"]
-    ]
+    ordered = sorted(played, key=lambda row: FAMILIES.index(row["family"]))
+    return [{**row, **one} for row in ordered for one in row["detectors"]]
 
 
-def streamed(arm: Arm, quick: bool) -> tuple[Stream, list[Touching]]:
+def streamed(arm: Arm, seed: int) -> tuple[Stream, list[Touching]]:
     """Let an arm run, and return its stream and its contacts, none where it is not touched."""
-    if isinstance(arm, FreeCell):
-        return free_stream(arm), []
-    return contact_stream(arm) if isinstance(arm, ContactCell) else hard_stream(arm, quick)
-
-
-def contenders_of(arm: Arm, every: Iterable[Arm]) -> tuple[Contender, ...]:
-    """Return the detectors that are given an arm: ablations only what the goals are about."""
-    if isinstance(arm, HardCell) or arm.kind != "nominal" or arm.speed_m_s != scenario("contacts")["goal"]["speed_m_s"]:
-        return DETECTORS
-    if isinstance(arm, FreeCell):
-        free = [other for other in every if isinstance(other, FreeCell)]
-        alike = [other for other in free if replace(arm, seed=other.seed) == other]
-        whole = arm in alike[:ABLATED_ARMS]
-    else:
-        whole = arm.sensing == "nominal"
-    return (*DETECTORS, *ablated()) if whole else DETECTORS
+    if arm.family == "free":
+        return free_stream(arm, seed), []
+    return contact_stream(arm, seed) if arm.family == "contacts" else hard_stream(arm, seed)
 
 
 def sweep_values(contender: Contender) -> list[float]:

@@ -49,8 +49,8 @@ def arms_of(rows: list[Row], family: str) -> list[Row]:
     goal = scenario("contacts")["goal"]["speed_m_s"]
 
     def apart(row: Row) -> Row:
-        pace = "standing" if not row.get("speed_m_s") else "goal" if row["speed_m_s"] == goal else "slower"
-        return {"arm": row.get("kind"), "pace": pace, "told": row.get("motion") != UNTOLD}
+        pace = "standing" if not row["speed_m_s"] else "goal" if row["speed_m_s"] == goal else "slower"
+        return {"arm": row["kind"], "pace": pace, "told": row["path"] != UNTOLD}
 
     return [row | apart(row) for row in rows if row["family"] == family]
 
@@ -155,7 +155,7 @@ def hard_rows(arms: list[Row], contenders: Sequence[Contender]) -> list[Row]:
     groups: Groups = {
         HARD: {"told": True},
         **{f"{HARD}, {name}": {"told": True, "near": who} for name, who in _NEAR.items()},
-        **{f"hard: {motion}": {"motion": motion} for motion in dict.fromkeys(row["motion"] for row in arms)},
+        **{f"hard: {motion}": {"path": motion} for motion in dict.fromkeys(row["path"] for row in arms)},
     }
     touched = {name.replace("hard", "hard, touched"): where | {"detectable": True} for name, where in groups.items()}
     free = [row for row in arms if row["near"] != "touched"]
@@ -163,14 +163,12 @@ def hard_rows(arms: list[Row], contenders: Sequence[Contender]) -> list[Row]:
 
 
 def ablation_rows(free: list[Row], touched: list[Row]) -> list[Row]:
-    """Return `pretouch` and its ablations on the arms that ablations were given."""
+    """Return `pretouch` and its ablations on the arms that ablations are given."""
     compared = (DETECTORS[-1], *ablated())
-    names = {contender.name for contender in ablated()}
-    shared = {(row["family"], row["seed"]) for row in free + touched if row["contender"] in names}
-    alarms, contacts = ([row for row in arms if (row["family"], row["seed"]) in shared] for arms in (free, touched))
+    arms, contacts = group(free, {"ablated": True}), contacts_of(group(touched, {"ablated": True}))
     return [
-        *free_rows(alarms, compared, {ABLATED_FREE: {}}),
-        *contact_rows(contacts_of(contacts), compared, {ABLATED_CONTACTS: {"goal": True}}),
+        *free_rows(arms, compared, {ABLATED_FREE: {}}),
+        *contact_rows(contacts, compared, {ABLATED_CONTACTS: {"goal": True}}),
     ]
 
 

@@ -1,7 +1,6 @@
 """Arms as unkind as real ones, in motions other than circle and line: free, or touched (`scenarios/hard.toml`)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from pretouch.types import FloatArray
 from pretouch_lab.bench.contacts import Toucher, Touching, last_s, place_on
 from pretouch_lab.bench.dense_skin import gap
 from pretouch_lab.bench.motions import Motion, motion_of
-from pretouch_lab.bench.scenes import SeedRange, model, numbered, path_of, scenario, sensing_of
+from pretouch_lab.bench.scenes import Arm, model, path_of, scenario, sensing_of
 from pretouch_lab.bench.streams import AWAY, PROFILE, Alone, Stream, record_moved
 from pretouch_lab.replay import Place
 
@@ -24,52 +23,19 @@ _LOOKED_AT = 150
 """Places of a bystander that are drawn, and postures of the motion that each is held against."""
 
 
-@dataclass(frozen=True)
-class HardCell:
-    """One arm in one motion."""
-
-    motion: str
-    near: str
-    """nothing or standing; touched: a hand comes, touches and goes, again and again."""
-    seed: int
-    counted_s: float
-    """Time that counts [s], after the warm-up; of one that is touched about so much."""
-
-    @property
-    def name(self) -> str:
-        """Name for files."""
-        return f"{self.motion}_{self.near}_{self.seed:04d}"
-
-
-def hard_cells(seeds: SeedRange, quick: bool) -> list[HardCell]:
-    """Return the cells of the scenario file."""
-    family = scenario("hard")
-    counted, number = family["duration"]["quick_s" if quick else "full_s"], _touches(quick)
-    touched_s = number * (np.mean(family["contact"]["gap_s"]) + np.mean(family["contact"]["durations_s"]))
-    entries = [*family["cell"], *({**touched, "near": "touched"} for touched in family["touched"])]
-    return [
-        HardCell(entry["motion"], entry["near"], seed, float(touched_s if entry["near"] == "touched" else counted))
-        for entry, seed in numbered(family, entries, seeds, quick)
-    ]
-
-
-def _touches(quick: bool) -> int:
-    return int(scenario("hard")["contact"]["quick" if quick else "full"])
-
-
-def hard_stream(cell: HardCell, quick: bool) -> tuple[Stream, list[Touching]]:
+def hard_stream(arm: Arm, seed: int) -> tuple[Stream, list[Touching]]:
     """Let an arm move; return its stream and its contacts, none where it is not touched.
 
     With nobody near it has no units: the few readings that they would make of the arm itself are left out.
     """
-    family, sensing = scenario("hard"), sensing_of("nominal", cell.seed)
+    family, sensing = scenario("hard"), sensing_of("nominal", seed)
     start = float(family["duration"]["warm_up_s"])
-    motion = motion_of(cell.motion, cell.seed, start + 2.0 * cell.counted_s)
-    touches = _touched(cell, motion, _touches(quick)) if cell.near == "touched" else []
+    motion = motion_of(arm.path, seed, start + 2.0 * arm.counted_s)
+    touches = _touched(motion, arm.count, seed)
     what = Alone(
-        path_of("rest"), profile(PROFILE).task.speed_m_s, PlantParams(), None if cell.near == "nothing" else sensing,
-        sensing.hand_radius if touches else family["near"]["radius_m"], cell.seed,
-        last_s(touches) if touches else start + cell.counted_s, WORLD,
+        path_of("rest"), profile(PROFILE).task.speed_m_s, PlantParams(), None if arm.near == "nothing" else sensing,
+        sensing.hand_radius if touches else family["near"]["radius_m"], seed,
+        last_s(touches) if touches else start + arm.counted_s, WORLD,
         motion.course.at(0.0)[0],
     )  # fmt: skip
 
@@ -77,7 +43,7 @@ def hard_stream(cell: HardCell, quick: bool) -> tuple[Stream, list[Touching]]:
         plant.before_each_step(_gripping(plant, motion))
         if touches:
             return Toucher(plant, touches).hand
-        return _beside(motion, cell.seed) if cell.near == "standing" else AWAY
+        return _beside(motion, seed) if arm.near == "standing" else AWAY
 
     return record_moved(what, prepare, motion.course.command), touches
 
@@ -112,11 +78,11 @@ def _beside(motion: Motion, seed: int) -> FloatArray:
     return found
 
 
-def _touched(cell: HardCell, motion: Motion, number: int) -> list[Touching]:
+def _touched(motion: Motion, number: int, seed: int) -> list[Touching]:
     """Draw the contacts of an arm: the seed says where, how and when."""
-    family, rng, arm = scenario("hard"), np.random.default_rng([cell.seed, 63]), model()
+    family, rng, arm = scenario("hard"), np.random.default_rng([seed, 63]), model()
     chosen, hand = family["contact"], scenario("contacts")["hand"]
-    radius, at, found = sensing_of("nominal", cell.seed).hand_radius, float(family["duration"]["warm_up_s"]), []
+    radius, at, found = sensing_of("nominal", seed).hand_radius, float(family["duration"]["warm_up_s"]), []
     for _ in range(number):
         link = arm.link_index(f"{arm.description.name}_{chosen['links'][int(rng.integers(len(chosen['links'])))]}")
         point, normal = place_on(link, motion.course.at(at)[0], radius, rng, hand["from_m"])

@@ -97,6 +97,31 @@ class Sensing:
     """Of the person's visible hand [m]."""
 
 
+@dataclass(frozen=True)
+class Arm:
+    """One kind of arm of the detection benchmark, and what happens to it; a seed makes one of it."""
+
+    family: str
+    """free, contacts or hard: the scenario file."""
+    kind: str = "nominal"
+    """Of `arms.toml`."""
+    sensing: str = "nominal"
+    """Of `sensing.toml`."""
+    path: str = "circle"
+    """circle, line or rest; of the family hard a motion of its file."""
+    speed_m_s: float = 0.0
+    near: str = "nothing"
+    """nothing, standing or passing; touched: a hand comes, touches and goes, again and again."""
+    counted_s: float = 0.0
+    """Time that counts [s], after the warm-up."""
+    count: int = 0
+    """Contacts."""
+    ablated: bool = False
+    """Whether ablations are given it."""
+    world: str = ""
+    """Set of the domain randomisation of which the seed draws one, or none."""
+
+
 @cache
 def model() -> RobotModel:
     """Return the arm of all scenarios, one for each process."""

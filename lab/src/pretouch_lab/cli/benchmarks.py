@@ -66,9 +66,8 @@ def _finished(
 def detection(options: bench.Detection) -> dict[str, Any]:
     """See its options."""
     out = _folder(options, "detection", quick=options.quick)
-    which = options.seeds, options.quick, options.input(options.world)
-    trials = detecting.plays(detecting.arms(*which))
-    numbers = results(detecting.rows_of(played("detection", partial(detecting.trial, *which), trials, out, options)))
+    arms = detecting.plays(options.seeds, options.quick, options.input(options.world))
+    numbers = results(detecting.rows_of(played("detection", detecting.trial, arms, out, options)))
     return _finished(options, "detection", out, tables(numbers), numbers["resolution"], **numbers)
 
 
