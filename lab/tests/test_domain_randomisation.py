@@ -9,11 +9,10 @@ from pretouch.sensing.skin import paper_skin
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch_lab.cli import benchmarks
-from pretouch_lab.cli.bench import Detection
 from pretouch_lab.domain_randomisation import Parts, folder_part, randomised, sentence
 from pretouch_lab.experiment import arguments, context_of
 from pretouch_lab.experiments import static
-from pretouch_lab.options import Options
+from pretouch_lab.options import Detection, Options
 from pretouch_lab.run import open_run
 
 MODEL = RobotModel(panda())

@@ -17,7 +17,6 @@ from pretouch.control.path import Path as TaskPath
 from pretouch.errors import ExperimentError, SkinError
 from pretouch.params import RowKind
 from pretouch.profiles import Profile, profile
-from pretouch.recording.run_record import RunRecord
 from pretouch.robot.description import files_digest, robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, skin_file, skin_for
@@ -29,7 +28,7 @@ from pretouch.sim.scene import SceneSpec
 from pretouch.text_table import TextTable
 from pretouch_lab.options import Options
 from pretouch_lab.run import Play, Row, plays_of
-from pretouch_lab.trial import Record, Setup
+from pretouch_lab.trial import Record, Setup, Trace
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,8 +39,6 @@ _OF_THE_PAPER = ("off", "hard", "slack", "floor")
 """Restriction modes of the paper's equations; any other makes a profile what it is."""
 _NAMES_MODE = re.compile(r":approach(\.rows)?=")
 """How the name of a profile names a mode."""
-Trace = tuple[Row, RunRecord]
-"""A cell with the course of its trial."""
 
 
 @dataclass(frozen=True)

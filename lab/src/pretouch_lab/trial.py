@@ -29,7 +29,10 @@ from pretouch.sim.scene import SceneSpec, described, fixtures
 from pretouch.sim.touch_sensor import SimulatedTouchSkin, TouchErrors, TouchSensors
 from pretouch.types import ControlStep, FloatArray, Mode
 from pretouch_lab.domain_randomisation import Parts, randomised
+from pretouch_lab.run import Row
 
+Trace = tuple[Row, RunRecord]
+"""A cell with the course of its trial."""
 SETTLE_S = 0.2
 """Time the arm stands before the controller starts [s]: the observer's transient is over."""
 

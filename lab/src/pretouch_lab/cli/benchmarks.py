@@ -20,6 +20,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sim.plant_params import assumed_plant
 from pretouch.sim.randomisation import world_set
 from pretouch.text_table import TextTable
+from pretouch_lab import options as lab_options
 from pretouch_lab.bench import avoidance as avoiding
 from pretouch_lab.bench import calibration as calibrating
 from pretouch_lab.bench import cycle as timing
@@ -35,15 +36,14 @@ from pretouch_lab.bench.real_sets import files_digest as sets_digest
 from pretouch_lab.bench.real_sets import sets_in
 from pretouch_lab.bench.scenes import checksums
 from pretouch_lab.bench.workload import LARGEST_SKIN
-from pretouch_lab.cli import bench
 from pretouch_lab.cli.playing import begin, check_numbers, played, report
 from pretouch_lab.domain_randomisation import folder_part, sentence
 from pretouch_lab.run import Row, plays_of
 
 
-def _folder(options: bench.Published, name: str, **more: Any) -> Path:
+def _folder(options: lab_options.Published, name: str, **more: Any) -> Path:
     """Make the folder of a published benchmark's results, or take up one that a run with the same options began."""
-    world = options.world if isinstance(options, bench.InWorlds) else ""
+    world = options.world if isinstance(options, lab_options.InWorlds) else ""
     out = options.folder(f"bench-{name}{folder_part(world)}{'-quick' if options.quick else ''}")
     scenarios = sha256(repr(sorted(checksums().items())).encode()).hexdigest()
     about = {"bench": name, "seeds": options.seeds, "world": world, "scenarios_sha256": scenarios, **more}
@@ -54,7 +54,7 @@ def _folder(options: bench.Published, name: str, **more: Any) -> Path:
 
 
 def _finished(
-    options: bench.Published, name: str, out: Path, tables: list[TextTable], text: str = "", **numbers: Any
+    options: lab_options.Published, name: str, out: Path, tables: list[TextTable], text: str = "", **numbers: Any
 ) -> dict[str, Any]:
     """Show tables and write them with a text; return the numbers with what they say of the run."""
     kind, world = "quick" if options.quick else "full", getattr(options, "world", "")
@@ -63,7 +63,7 @@ def _finished(
     return {"about": about | ({"world": world} if world else {}), **numbers, "tables": tables}
 
 
-def detection(options: bench.Detection) -> dict[str, Any]:
+def detection(options: lab_options.Detection) -> dict[str, Any]:
     """See its options."""
     out = _folder(options, "detection", quick=options.quick)
     arms = detecting.plays(options.seeds, options.quick, options.input(options.world))
@@ -71,7 +71,7 @@ def detection(options: bench.Detection) -> dict[str, Any]:
     return _finished(options, "detection", out, tables(numbers), numbers["resolution"], **numbers)
 
 
-def avoidance(options: bench.Avoidance) -> dict[str, Any]:
+def avoidance(options: lab_options.Avoidance) -> dict[str, Any]:
     """See its options."""
     trials = avoiding.plays(options.seeds, options.quick, options.baselines, options.scenarios)
     other: Row = {}
@@ -88,7 +88,7 @@ def avoidance(options: bench.Avoidance) -> dict[str, Any]:
     return _finished(options, "avoidance", out, shown, text, rows=cells, **summary)
 
 
-def localization(options: bench.Localization) -> dict[str, Any]:
+def localization(options: lab_options.Localization) -> dict[str, Any]:
     """See its options."""
     out = _folder(options, "localization")
     arms = played("localization", locating.trial, locating.plays(options.seeds, options.quick), out, options)
@@ -96,25 +96,25 @@ def localization(options: bench.Localization) -> dict[str, Any]:
     return _finished(options, "localization", out, locating.tables(rows), rows=rows)
 
 
-def shield(options: bench.Shield) -> dict[str, Any]:
+def shield(options: lab_options.Shield) -> dict[str, Any]:
     """See its options."""
     out, trials = _folder(options, "shield"), shielding.plays(options.seeds, options.quick)
     rows = shielding.results(played("shield", shielding.trial, trials, out, options))
     return _finished(options, "shield", out, shielding.tables(rows), rows=rows)
 
 
-def both(options: bench.Both) -> dict[str, Any]:
+def both(options: lab_options.Both) -> dict[str, Any]:
     """See its options."""
     out = options.folder(f"bench{folder_part(options.world)}{'-quick' if options.quick else ''}")
     check_numbers(options, out)
-    shared = {each.name: getattr(options, each.name) for each in fields(bench.InWorlds)} | {"json": None}
-    detected = detection(bench.Detection(**shared | {"out": str(out / "detection")}))
-    avoided = avoidance(bench.Avoidance(**shared | {"out": str(out / "avoidance")}))
+    shared = {each.name: getattr(options, each.name) for each in fields(lab_options.InWorlds)} | {"json": None}
+    detected = detection(lab_options.Detection(**shared | {"out": str(out / "detection")}))
+    avoided = avoidance(lab_options.Avoidance(**shared | {"out": str(out / "avoidance")}))
     report([goal_table(detected, avoided), front_table(detected, avoided)], [], out)
     return {"detection": detected, "avoidance": avoided}
 
 
-def real(options: bench.Real) -> dict[str, Any]:
+def real(options: lab_options.Real) -> dict[str, Any]:
     """See its options."""
     for name in options.detectors:
         profile(name)  # an hour later would be late
@@ -130,7 +130,7 @@ def real(options: bench.Real) -> dict[str, Any]:
     return {"sets": {each.name: each.source for each in sets}, "left_out": left_out, "rows": rows, "tables": shown}
 
 
-def calibration(options: bench.Calibration) -> dict[str, Any]:
+def calibration(options: lab_options.Calibration) -> dict[str, Any]:
     """See its options."""
     if options.skins < 1:
         raise CalibrationError(f"The number of skins is {options.skins}: give at least 1.")
@@ -147,7 +147,7 @@ def calibration(options: bench.Calibration) -> dict[str, Any]:
     return {"rows": rows, "motion_s": plan.duration, "tables": shown}
 
 
-def cycle(options: bench.Cycle) -> dict[str, Any]:
+def cycle(options: lab_options.Cycle) -> dict[str, Any]:
     """See its options."""
     how = options.rate, options.cycles, options.profile, options.priority, options.cpu
     request = timing.CycleRequest(*how, arm=options.arm)

@@ -43,9 +43,9 @@ _NEAR_M = 0.1
 _DRIVES_S = 0.016
 """Time from a command to a motion [s]: the drives' set-point filter (`BrakingParams.latency_s`)."""
 _POSTURES = 40
-START_S, EVERY_S = 2.0, 2.5
+_START_S, _EVERY_S = 2.0, 2.5
 """When the first one sets out, and how long after it the next [s]."""
-PARKED = np.array([0.0, 0.0, -3.0])
+PARKED = (0.0, 0.0, -3.0)
 """Where the ghost is in between: below the floor [m]."""
 _BATCH, _BATCHES = 16, 50
 
@@ -68,13 +68,10 @@ class ApproachingObstacle:
 class ApproachingObstacles:
     """Moves the ghost of a scene: it follows the link that it comes at, so that they meet whatever the arm does."""
 
-    def __init__(self, model: RobotModel, skin: Skin, params: CoverageParams, count: int, seed: int) -> None:
+    def __init__(self, model: RobotModel, skin: Skin, params: CoverageParams, seed: int) -> None:
         self._model, self._skin, self._params = model, skin, params
         self._rng = np.random.default_rng([seed, 52])
         self.came: list[ApproachingObstacle] = []
-        self.end = START_S + EVERY_S * count
-        """When the last one has come [s]."""
-        self._count = count
 
     def attach(self, plant: Plant, _: object) -> None:
         """Move the ghost before each physics step."""
@@ -82,16 +79,16 @@ class ApproachingObstacles:
         Ghost(plant, self._place)
 
     def _place(self, time: float) -> FloatArray:
-        number = int((time - START_S) // EVERY_S)
-        if not 0 <= number < self._count:
-            return PARKED
+        number = int((time - _START_S) // _EVERY_S)
+        if not 0 <= number < COUNT:
+            return np.array(PARKED)
         if number == len(self.came):
             self.came.append(self._drawn())
         obstacle = self.came[number]
-        left = self._params.way_m - self._params.closing_m_s * (time - START_S - number * EVERY_S)
+        left = self._params.way_m - self._params.closing_m_s * (time - _START_S - number * _EVERY_S)
         R, p = self._plant.link_rotation[obstacle.link], self._plant.link_position[obstacle.link]
         if left <= 0.0:
-            return PARKED
+            return np.array(PARKED)
         center: FloatArray = p + R @ (obstacle.center + left * obstacle.way)
         obstacle.track[round(time / self._plant.params.period_s)] = (left, center)
         return center
@@ -142,21 +139,20 @@ def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return what is measured and what it left behind."""
     model, params = context.model, CoverageParams()
     skin = skin_of(cell["skin"], model, context.skin, seed)
-    approaching = ApproachingObstacles(model, skin, params, COUNT, seed)
+    approaching = ApproachingObstacles(model, skin, params, seed)
     own, speed = context.profile(cell), ARMS[cell["arm"]]
     if speed is not None:
         own = replace(own, task=replace(own.task, speed_m_s=speed))
-    parked = (float(PARKED[0]), float(PARKED[1]), float(PARKED[2]))
     setup = context.setup(
         cell,
         seed,
-        SceneSpec(ghost=GhostSpec(params.object_radius_m, parked)),
+        SceneSpec(ghost=GhostSpec(params.object_radius_m, PARKED)),
         Circle(start_angle=float(np.random.default_rng([seed, 55]).uniform(0, 2 * np.pi))),
         skin=skin,
         profile=own,
         prepare=approaching.attach,
     )
-    record = play(setup, lambda step, _: step.stamp >= approaching.end)
+    record = play(setup, lambda step, _: step.stamp >= _START_S + _EVERY_S * COUNT)
     return results(approaching.came, record, params), record
 
 

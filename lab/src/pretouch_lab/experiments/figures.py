@@ -15,7 +15,7 @@ from pretouch.recording.run_record import RunRecord
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import spans
 from pretouch.types import BoolArray, FloatArray
-from pretouch_lab.experiment import Trace
+from pretouch_lab.trial import Trace
 
 BLIND, SENSING, OURS = "tab:blue", "tab:red", "tab:green"
 AXES = "xyz"

@@ -24,15 +24,13 @@ from pretouch_lab.experiment import Context, Experiment, controllers, main
 from pretouch_lab.options import Options
 from pretouch_lab.run import Row
 from pretouch_lab.second_arm import SecondArm
-from pretouch_lab.table import Column, medians, peak, rounded
+from pretouch_lab.table import Column, medians, rounded
 from pretouch_lab.trial import SETTLE_S, Record
 
 KNOWS = ("blind", "seen", "told")
 """What each arm has of the other: units that see through it; units that take it for anything else; or its reported
 state, by which it is a fixture that moves."""
 _DURATION_S = 40.0
-_APART_S = 0.2
-"""A touch that begins sooner after the last one is the same [s]."""
 APART = BasePose((1.1, 0.0, 0.0), np.pi)
 """Where the second arm stands: across the table, face to face with the first."""
 BACK: FloatArray = np.asarray(np.linalg.inv(APART.T))
@@ -82,14 +80,11 @@ def way(side: float, share: float) -> WayPoints:
 
 
 @dataclass
-class Felt:
-    """What touched what, before each physics step."""
+class Peaks:
+    """The largest forces between two arms, and of either on the person."""
 
-    time: list[float] = field(default_factory=list)
-    arms_n: list[float] = field(default_factory=list)
-    """Force between the arms [N]."""
-    person_n: list[float] = field(default_factory=list)
-    """The larger of both arms' forces on the person [N]."""
+    arms_n: float = 0.0
+    person_n: float = 0.0
 
     def attach(self, first: Plant, second: SecondArm) -> None:
         """Measure before each physics step."""
@@ -99,7 +94,7 @@ class Felt:
         owner = np.where((bodies > 0) & (bodies < len(first.model.links)), 1, 0)
         owner[second.first_body + 1 : second.first_body + len(second.model.links)] = 2
 
-        def measure(time: float) -> None:
+        def measure(_: float) -> None:
             between, on_person = np.zeros(3), np.zeros((3, 3))
             for i in range(data.ncon):
                 contact = data.contact[i]
@@ -110,9 +105,8 @@ class Felt:
                     between += force if owner[one] < owner[other] else -force
                 elif hand in (one, other):
                     on_person[owner[one] or owner[other]] += force if other == hand else -force
-            self.time.append(time)
-            self.arms_n.append(float(np.linalg.norm(between)))
-            self.person_n.append(float(np.linalg.norm(on_person[1:], axis=1).max()))
+            self.arms_n = max(self.arms_n, float(np.linalg.norm(between)))
+            self.person_n = max(self.person_n, float(np.linalg.norm(on_person[1:], axis=1).max()))
 
         first.before_each_step(measure)
 
@@ -139,7 +133,7 @@ class Side:
         self.steps.append(cycle.step)
 
 
-def play(context: Context, profile: Profile, knows: str, seed: int, duration: float) -> tuple[list[Side], Felt]:
+def play(context: Context, profile: Profile, knows: str, seed: int, duration: float) -> tuple[list[Side], Peaks]:
     """Run a trial; `knows` is what each arm has of the other: `blind`, `seen` or `told`."""
     model, rng = context.model, np.random.default_rng([seed, 61])
     ways = way(1.0, 0.0), way(-1.0, float(rng.uniform()))
@@ -150,8 +144,8 @@ def play(context: Context, profile: Profile, knows: str, seed: int, duration: fl
     first = Plant(model, scene, context.arm, brought_to(model, ways[0].point(0.0)), seed)
     second.join(first, brought_to(model, ways[1].point(0.0)))
     Hand(first, person, PersonArm(speed_max=_SPEED_M_S))
-    felt = Felt()
-    felt.attach(first, second)
+    peaks = Peaks()
+    peaks.attach(first, second)
     arms: tuple[ArmInWorld, ArmInWorld] = (first, second)
     units = [_mounted(arms[i], arms[1 - i], context, seed + 1_000_000 * i, knows == "blind") for i in (0, 1)]
     first.advance(SETTLE_S)
@@ -166,7 +160,7 @@ def play(context: Context, profile: Profile, knows: str, seed: int, duration: fl
         tick = clock.tick()
         for side in sides:
             side.turn(tick)
-    return sides, felt
+    return sides, peaks
 
 
 def _reported(sides: list[Side], number: int) -> RobotState:
@@ -198,44 +192,29 @@ def cells(options: Options) -> list[Row]:
 def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record | None]:
     """Run one trial; return what is measured."""
     own = context.profile(cell)
-    sides, felt = play(context, own, cell["knows"], seed, _DURATION_S)
-    return results(sides, felt, own.task.speed_m_s * (_DURATION_S - sides[0].steps[0].stamp)), None
+    sides, peaks = play(context, own, cell["knows"], seed, _DURATION_S)
+    return results(sides, peaks, own.task.speed_m_s * (_DURATION_S - sides[0].steps[0].stamp)), None
 
 
-def results(sides: list[Side], felt: Felt, asked_m: float) -> Row:
+def results(sides: list[Side], peaks: Peaks, asked_m: float) -> Row:
     """Numbers of one trial, in which each arm was asked for a way of so many metres."""
-    time, arms, person = (np.array(part) for part in (felt.time, felt.arms_n, felt.person_n))
-    done = [side.steps[-1].path_phase / asked_m for side in sides]
-    arm_touches, person_touches = touches(time, arms), touches(time, person)
     return {
-        "arms": arm_touches,
-        "arms_touched": arm_touches > 0,
-        "arms_peak_n": rounded(peak(arms), 1),
-        "person": person_touches,
-        "person_touched": person_touches > 0,
-        "person_peak_n": rounded(peak(person), 1),
-        "done": rounded(float(np.mean(done)), 4),
-        "least_done": rounded(min(done), 4),
+        "arms_touched": peaks.arms_n > TOUCH_N,
+        "arms_peak_n": rounded(peaks.arms_n, 1),
+        "person_touched": peaks.person_n > TOUCH_N,
+        "person_peak_n": rounded(peaks.person_n, 1),
+        "done": rounded(float(np.mean([side.steps[-1].path_phase for side in sides])) / asked_m, 4),
     }
-
-
-def touches(time: FloatArray, force: FloatArray) -> int:
-    """Count the touches in forces (T,) [N] at instants (T,) [s]."""
-    touching = time[force > TOUCH_N]
-    return int(len(touching) > 0) + int((np.diff(touching) > _APART_S).sum())
 
 
 _COLUMNS = (
     Column("profile", "profile"),
     Column("other arm", "knows"),
     Column("arms\ntouch", "arms_touched", of="trials"),
-    Column("touches", "arms"),
     Column("peak\n[N]", "arms_peak_n", 0),
     Column("person\ntouched", "person_touched", of="trials"),
-    Column("touches", "person"),
     Column("peak\n[N]", "person_peak_n", 0),
     Column("way\n[%]", "done", 0, 100.0),
-    Column("slower\n[%]", "least_done", 0, 100.0),
 )
 
 
@@ -244,8 +223,7 @@ def tables(rows: list[Row]) -> list[TextTable]:
     note = (
         "Blind: the units see through the other arm. Seen: they take it for anything that comes near. Told: its"
         " reported joint positions make it a fixture that moves. Arms touch, person touched: trials with such a touch;"
-        " touches: in all trials together; peak: the largest force of a trial. Way: of what is asked in"
-        f" {_DURATION_S:g} s, the mean of both arms, and the slower of them."
+        f" peak: the largest force of a trial. Way: of what is asked in {_DURATION_S:g} s, the mean of both arms."
     )
     title = "Two arms over one table, a person between: medians over the seeds"
     return [medians(title, _COLUMNS, rows, ("profile", "restrictions", "knows"), note, 2)]
