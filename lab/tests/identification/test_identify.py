@@ -67,7 +67,7 @@ def test_a_contact_is_found_and_left_out():
 def test_without_velocities_the_rest_is_found_and_the_observer_kept(samples):
     found = identify(replace(samples, qd=None), MODEL, USUAL)
     assert sigmas_off(found, 0, MADE.offset) < 6.0
-    assert not found.has_velocities
+    assert found.noise is None
     assert found.fit.gain == USUAL.observer_gain_1_s
     assert "observer_gain_1_s stay" in arm_toml(found, MODEL, "x")
 

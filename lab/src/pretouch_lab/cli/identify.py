@@ -90,7 +90,7 @@ def _show(result: "Identified", model: "RobotModel", source: str) -> None:
     console.print(PlainTable(["joint", *(row.name for row in rows)], table), crop=False)
     payload, error = result.fit.payload
     lines = [f"Payload {payload:.3f} +- {error:.3f} kg."]
-    if result.has_velocities:
+    if result.noise is not None:
         lines.append(
             f"Velocity noise {result.noise.velocity_rad_s:.4f} rad/s; observer gain {result.fit.gain:.1f} +-"
             f" {result.fit.errors[-1]:.1f} 1/s."
@@ -112,7 +112,7 @@ def _shown(number: float, error: float, identified: bool) -> str:
 
 
 def _numbers(result: "Identified", model: "RobotModel", source: str) -> dict[str, Any]:
-    fitted, velocities = result.fit, result.has_velocities
+    fitted, noise = result.fit, result.noise
     return {
         "recording": source,
         "arm": model.description.name,
@@ -122,6 +122,6 @@ def _numbers(result: "Identified", model: "RobotModel", source: str) -> dict[str
         "contact_spans_s": result.spans,
         "of_joints": result.of_joints(),
         "payload_kg": fitted.payload,
-        "velocity_noise_rad_s": result.noise.velocity_rad_s,
-        "observer_gain_1_s": [fitted.gain, fitted.errors[-1]] if velocities else None,
+        "velocity_noise_rad_s": noise.velocity_rad_s if noise else None,
+        "observer_gain_1_s": [fitted.gain, fitted.errors[-1]] if noise else None,
     }

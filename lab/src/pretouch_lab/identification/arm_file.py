@@ -7,7 +7,6 @@ from matplotlib.figure import Figure
 
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
-from pretouch_lab.identification.fit import OWN
 from pretouch_lab.identification.identify import Identified
 
 _MOST_POINTS = 4000
@@ -34,19 +33,17 @@ def arm_toml(result: Identified, model: RobotModel, source: str) -> str:
             unsure = ", ".join(str(j + 1) for j in np.flatnonzero(~row.identified))
             note = f"# joints {unsure}: the recording hardly tells"
             lines += _field(row.field, _list(values), _list(errors), note if unsure else "")
-    factors, errors = np.ones(len(model.links)), np.zeros(len(model.links))
-    for link in range(len(model.links)):
-        moved = np.flatnonzero(model.moved_by[link])
-        if len(moved):  # links behind the same joint are off alike
-            number = OWN * model.n + moved[-1]
-            factors[link], errors[link] = max(1.0 + fitted.numbers[number], 0.05), fitted.errors[number]
     masses = next(row for row in result.of_joints() if row.field == "")
+    factors, errors = np.ones(len(model.links)), np.zeros(len(model.links))
+    for link, moved in enumerate(map(np.flatnonzero, model.moved_by)):
+        if len(moved):  # links behind the same joint are off alike
+            factors[link], errors[link] = max(1.0 + masses.values[moved[-1]], 0.05), masses.standard_errors[moved[-1]]
     unsure = ", ".join(model.joints[j] for j in np.flatnonzero(~masses.identified))
     note = f"# the links behind {unsure}: what was assumed before is hardly changed"
     lines += _field("mass_factors", _list(factors), _list(errors), note if unsure else "")
     payload, error = fitted.payload
     lines += _field("payload_kg", f"{max(payload, 0.0):.6g}", f"{error:.3g}")
-    if result.has_velocities:
+    if noise is not None:
         lines += _field("velocity_noise_rad_s", f"{noise.velocity_rad_s:.6g}", f"{noise.velocity_error_rad_s:.3g}")
         lines += _field("observer_gain_1_s", f"{fitted.gain:.6g}", f"{float(fitted.errors[-1]):.3g}")
     else:

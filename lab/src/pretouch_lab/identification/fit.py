@@ -126,19 +126,13 @@ def _noise(measured: FloatArray, speed: FloatArray, growth: FloatArray, calm: Bo
 
 
 def _late(data: Usable, values: list[FloatArray], spacing: float, ahead: list[float], pole: float) -> FloatArray:
-    """Filter values (F, ...) of each stretch, so far apart [s], with one pole; return them at the samples (N, ...)."""
+    """Low-pass values (F, ...) of each stretch, so far apart [s], with one pole; at the samples (N, ...)."""
     rows = []
     for span, each in zip(data.stretches, values, strict=True):
         time = data.samples.stamp[span]
         smooth, _ = lfilter(ahead, [1.0, -pole], each, axis=0, zi=(1.0 - ahead[0]) * each[:1])
         rows.append(on_grid(time, time[0], spacing, smooth))
     return np.concatenate(rows)
-
-
-def low_passed(data: Usable, fine_values: list[FloatArray], gain: float) -> FloatArray:
-    """Low-pass values (F, ...) of each stretch as the observer does, and return them at the samples (N, ...)."""
-    part = gain * _FINE_S / (1.0 + gain * _FINE_S)
-    return _late(data, fine_values, _FINE_S, [part], 1.0 - part)
 
 
 def carried_late(data: Usable, columns: Columns, gain: float) -> FloatArray:
@@ -243,7 +237,8 @@ def design(
     for q, speed in zip(columns.q, columns.speed, strict=True):
         friction = friction_parts(speed, np.exp(own[:, 2]), own[:, 3])
         shapes.append(np.stack([*friction, np.sin(cycles * q), np.cos(cycles * q)], axis=1))
-    late = low_passed(data, shapes, gain)
+    part = gain * _FINE_S / (1.0 + gain * _FINE_S)  # as the observer does
+    late = _late(data, shapes, _FINE_S, [part], 1.0 - part)
     late[:, 1:3] *= own[:, 1]  # derivatives by what the friction's F1 multiplies
     X = np.zeros((count, n, len(theta)))
     for j in range(n):

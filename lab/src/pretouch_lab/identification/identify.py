@@ -38,7 +38,7 @@ class Noise:
     """(n,) of the torque sensors, before the observer [Nm]."""
     torque_errors_nm: FloatArray
     velocity_rad_s: float
-    """Of the measured velocities [rad/s]; NaN without velocities."""
+    """Of the measured velocities [rad/s]."""
     velocity_error_rad_s: float
 
 
@@ -61,7 +61,8 @@ class Identified:
     """What a recording of free motion tells of an arm with n joints."""
 
     fit: Fit
-    noise: Noise
+    noise: Noise | None
+    """None without velocities: theirs is then in what is left of the torques, and the observer's gain stays."""
     samples: ArmSamples
     """Those used or left out."""
     spans: tuple[tuple[float, float], ...]
@@ -71,11 +72,6 @@ class Identified:
     """Free motion that was used [s]."""
     usual: PlantParams
     """The arm as it is taken to be without a recording."""
-
-    @property
-    def has_velocities(self) -> bool:
-        """Whether the noise of velocities, that of torques and the observer's gain are identified."""
-        return self.noise.velocity_rad_s == self.noise.velocity_rad_s
 
     def of_joints(self) -> list[Quantity]:
         """Return the numbers of the joints. The friction F1 is that which the interface does not compensate."""
@@ -94,7 +90,7 @@ class Identified:
             ("phase of the ripple [rad]", "ripple_phases_rad", phase, phase_error, np.ones(len(own), np.bool_)),
             ("mass error of its links", "", self.fit.numbers[masses], self.fit.errors[masses], clear[masses]),
         ]
-        if self.has_velocities:  # else the velocities' noise is in what is left of the torques
+        if noise is not None:
             torque = noise.torque_nm
             rows.append(("torque noise [Nm]", "torque_noise_nm", torque, noise.torque_errors_nm, torque > 0.0))
         return [Quantity(*row) for row in rows]
@@ -147,7 +143,7 @@ def identify(samples: ArmSamples, model: RobotModel, usual: PlantParams) -> Iden
             f"{len(spans)} spans look like contacts and are left out (seconds from the first sample): {listed}"
             f"{' and more' if len(spans) > 8 else ''}."
         )
-    noise = noise_of(data, columns, fitted, used, usual)
+    noise = None if samples.qd is None else noise_of(data, columns, fitted, used, usual)
     return Identified(fitted, noise, data.samples, spans, tuple(notes), seconds, usual)
 
 
@@ -185,51 +181,38 @@ def free_samples(data: Usable, fitted: Fit) -> tuple[BoolArray, tuple[tuple[floa
 
 
 def noise_of(data: Usable, columns: Columns, fitted: Fit, used: BoolArray, usual: PlantParams) -> Noise:
-    """Take the noise of the samples that are used (N,) apart."""
-    left = data.samples.tau - fitted.expected - fitted.kicked
-    # what is five deviations off is cut: one outlier would be most of a variance
-    bound = 5.0 * joint_scale(left[used])
-    square = np.clip(left - np.median(left[used], axis=0), -bound, bound) ** 2
-    length = round(BLOCK_S / data.period)
-    begins = [begin for span in data.stretches for begin in range(span.start, span.stop - length, length)]
-    blocks = np.array(
-        [square[begin : begin + length].mean(axis=0) for begin in begins if used[begin : begin + length].all()]
-    )
-    if len(blocks) < _LEAST_BLOCKS:
-        raise CalibrationError(
-            f"There are {len(blocks)} stretches of {BLOCK_S:g} s without a break: the noise needs {_LEAST_BLOCKS}."
-            " Record longer, along smoother paths, with nothing touching the arm."
-        )
-    noise, velocity = columns.velocity_noise[used], np.nan
-    if data.samples.qd is not None:  # the derivatives' noise is in what differs, too
-        excess = float(np.mean(joint_scale(noise) ** 2 - columns.motion[0].speed_noise ** 2))
-        velocity = float(np.sqrt(max(excess, _LEAST_VELOCITY_RAD_S**2)))
-    variance = blocks.mean(axis=0)
-    without = (len(blocks) * variance - blocks) / (len(blocks) - 1)  # each with one block left out: the jackknife
-    torque = _torque_noise(variance, velocity, columns, fitted, usual)
-    again = np.array([_torque_noise(sample, velocity, columns, fitted, usual) for sample in without])
-    errors = np.sqrt(len(again) - 1.0) * again.std(axis=0)
-    return Noise(torque, errors, velocity, 1.17 * velocity / np.sqrt(2.0 * noise.size))
-
-
-def _torque_noise(
-    variance: FloatArray, velocity: float, columns: Columns, fitted: Fit, usual: PlantParams
-) -> FloatArray:
-    """Standard deviation (n,) [Nm] of the torque sensors' noise that leaves such a variance behind the observer.
+    """Take the noise of the samples that are used (N,) apart, where velocities are measured.
 
     A first-order noise of corner a through the discrete low-pass of the observer, alpha = K dt / (1 + K dt), keeps the
     part alpha / (2 - alpha) (1 + rho (1 - alpha)) / (1 - rho (1 - alpha)) of its variance, rho = exp(-a dt). What
     earlier noise of the velocities left in the integral is taken off: K'^2 (M M^T)_jj alpha / (2 - alpha) of it; and
     so is what the noise of the positions' derivatives, which is in what was taken for noise of the velocities, leaves.
     """
+    left = data.samples.tau - fitted.expected - fitted.kicked
+    # what is five deviations off is cut: one outlier would be most of a variance
+    bound = 5.0 * joint_scale(left[used])
+    square = np.clip(left - np.median(left[used], axis=0), -bound, bound) ** 2
+    length = round(BLOCK_S / data.period)
+    begins = [begin for span in data.stretches for begin in range(span.start, span.stop - length, length)]
+    whole = [slice(begin, begin + length) for begin in begins if used[begin : begin + length].all()]
+    if len(whole) < _LEAST_BLOCKS:
+        raise CalibrationError(
+            f"There are {len(whole)} stretches of {BLOCK_S:g} s without a break: the noise needs {_LEAST_BLOCKS}."
+            " Record longer, along smoother paths, with nothing touching the arm."
+        )
+    derivative = columns.motion[0].speed_noise ** 2  # is in what differs, too
+    noise = columns.velocity_noise[used]
+    velocity = max(float(np.mean(joint_scale(noise) ** 2 - derivative)), _LEAST_VELOCITY_RAD_S**2)
     dt, gain = usual.period_s, fitted.gain
     alpha, rho = gain * dt / (1.0 + gain * dt), np.exp(-2.0 * np.pi * usual.torque_noise_hz * dt)
     late = rho * (1.0 - alpha)
     part = alpha / (2.0 - alpha) * (1.0 + late) / (1.0 - late)
-    own = np.zeros(len(variance))
-    if not np.isnan(velocity):
-        unknown = columns.motion[0].speed_noise ** 2
-        unknown = unknown * velocity**2 / (unknown + velocity**2)
-        shares = velocity**2 * alpha / (2.0 - alpha) + unknown
-        own = (alpha / dt) ** 2 * columns.mass_square @ shares
-    return np.sqrt(np.maximum(variance - own, 0.0) / part)
+    shares = velocity * alpha / (2.0 - alpha) + derivative * velocity / (derivative + velocity)
+    of_velocities = (alpha / dt) ** 2 * columns.mass_square @ shares
+    blocks = np.array([square[block].mean(axis=0) for block in whole])
+    without = (blocks.sum(axis=0) - blocks) / (len(blocks) - 1)  # each with one block left out: the jackknife
+    torque, again = (
+        np.sqrt(np.maximum(variance - of_velocities, 0.0) / part) for variance in (blocks.mean(axis=0), without)
+    )
+    errors = np.sqrt(len(again) - 1.0) * again.std(axis=0)
+    return Noise(torque, errors, float(np.sqrt(velocity)), 1.17 * float(np.sqrt(velocity / (2.0 * noise.size))))

@@ -160,8 +160,7 @@ def _nearest(time: FloatArray, at: FloatArray) -> FloatArray:
 
 def moved(data: Usable) -> tuple[Usable, list[Motion]]:
     """Estimate the motion of each stretch; returns the samples as well, with better stamps if theirs are uneven."""
-    s, notes, off_s = data.samples, list(data.notes), 0.0
-    spans = data.stretches
+    s, spans, notes, off_s = data.samples, data.stretches, list(data.notes), 0.0
     positions, stamps = [s.q[span] for span in spans], [s.stamp[span] for span in spans]
     motions = motions_of(stamps, positions)
     for _ in range(_ROUNDS):
@@ -200,15 +199,14 @@ def _stamp_errors(
     speed, off = np.concatenate(speeds), np.concatenate(offs)
     square = np.maximum(np.einsum("ti,ti->t", speed, speed), 1e-12)
     moving = square > _MOVING_RAD_S**2
-    nothing = [np.zeros(len(time)) for time in stamps]
     if n < 2 or moving.sum() < _LEAST_MOVING:
-        return nothing, 0.0
+        return [], 0.0
     error = np.einsum("ti,ti->t", off, speed) / square
     across = off - error[:, None] * speed
     noise = np.median(across[moving] ** 2) * n / (n - 1.0) / _MEDIAN_SQUARE
     variance = float(np.median(error[moving] ** 2 - _MEDIAN_SQUARE * noise / square[moving])) / _MEDIAN_SQUARE
     if variance * float(np.median(square[moving])) < noise:
-        return nothing, 0.0
+        return [], 0.0
     believed = error * variance * square / (variance * square + noise + 1e-18)
     return np.split(believed, np.cumsum([len(time) for time in stamps])[:-1]), float(np.sqrt(variance))
 
