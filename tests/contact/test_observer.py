@@ -61,7 +61,7 @@ def test_a_known_wrench_is_recovered_with_its_sign(panda_model: RobotModel, axis
     jacobian = panda_model.ee_jacobian(panda_model.kinematics(q))
     force = np.zeros(6)
     force[axis] = sign * 20.0  # [N], then [Nm]
-    wrench = wrench_from_torques(jacobian, jacobian.T @ force, damping=1e-3, smallest_singular_value=0.01)
+    wrench = wrench_from_torques(panda_model.hinges, panda_model.mechanism.arm, q, jacobian.T @ force, 1e-3, 0.01)
     assert wrench is not None
     np.testing.assert_allclose(wrench, force, atol=0.01)
 
@@ -70,4 +70,4 @@ def test_there_is_no_estimate_near_a_singularity(panda_model: RobotModel):
     straight = np.zeros(7)  # elbow and wrist stretched: the arm cannot move towards its base
     jacobian = panda_model.ee_jacobian(panda_model.kinematics(straight))
     assert np.linalg.svd(jacobian, compute_uv=False)[-1] < 1e-3
-    assert wrench_from_torques(jacobian, np.ones(7), 0.01, 0.05) is None
+    assert wrench_from_torques(panda_model.hinges, panda_model.mechanism.arm, straight, np.ones(7), 0.01, 0.05) is None

@@ -3,8 +3,8 @@ import pytest
 
 from pretouch.control.path import Circle, segment
 from pretouch.errors import PathError
-from pretouch.sim.hand import way_round
 from pretouch.sim.paper_scenes import board_beside
+from pretouch.sim.physics import way_round
 
 PATHS = {"circle": Circle(), "line": segment((0.4, -0.5, 0.5), (0.4, 0.5, 0.5))}
 

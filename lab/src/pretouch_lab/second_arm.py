@@ -51,10 +51,10 @@ class SecondArm(ArmInWorld):
         """Measure what the last physics step made of the arm, where time has passed since: `read` does it too."""
         if self._torques is None or self._first.time == self.time:
             return
-        p, draws = self.params, self._rng.standard_normal((2, self._n))
+        p, noise = self.params, self._noise * self._rng.standard_normal((2, self._n))
         self._age(p.period_s)
         self.time = self._first.time
-        end_step(self._arm, *self._torques, p.velocity_noise_rad_s * draws[0], self._torque_noise * draws[1])
+        end_step(self._arm, *self._torques, noise[0], noise[1])
         self._torques = None
         if p.state_delay_s:
             self._states.append((self.time, self._arm.report.copy()))

@@ -186,7 +186,7 @@ def _wrench(model: RobotModel, q: FloatArray, tau: FloatArray) -> FloatArray | N
     """Wrench (6,) that a robot's interface would make of external torques, or None where it has none."""
     if np.isnan(tau).any():
         return None
-    return wrench_from_torques(model.ee_jacobian(model.kinematics(q)), tau, _DAMPING, _SINGULAR)
+    return wrench_from_torques(model.hinges, model.mechanism.arm, q.copy(), tau.copy(), _DAMPING, _SINGULAR)
 
 
 def _by_torques(r: TorqueRecording, profile: Profile) -> tuple[DetectorResult, TorqueCourse]:

@@ -8,19 +8,31 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from pretouch.compiled import compiled, kernel
 from pretouch.robot.model import RobotModel
+from pretouch.sim.physics import AIM, AT_HOME, END, POINT, RATE, SPEED, HandMemory
 from pretouch.sim.plant import TOUCH_N, Plant
 from pretouch.types import FloatArray
+
+_NONE = np.zeros(3)
 
 
 class HandGoal(NamedTuple):
     """Where the arm of the person wants the hand to be."""
 
     position: FloatArray
-    """(3,) base frame [m]."""
+    """(3,) from the point of the link, axes of the base frame [m]."""
     force_max: float
     """Largest force the person pulls or pushes with [N]."""
+    link: int = 0
+    """The world, or the link that the hand follows."""
+    point: FloatArray = _NONE
+    """(3,) where it is now in the link's frame [m]."""
+    rate: FloatArray = _NONE
+    """(3,) its velocity in that frame [m/s]."""
+    way_round: bool = False
+    """Whether the hand goes there by `physics.way_round`."""
+    until: float = -np.inf
+    """When the person thinks again, if nothing touches before [s]."""
 
 
 class PersonArm(NamedTuple):
@@ -51,51 +63,33 @@ class Hand:
 
     def __init__(self, plant: Plant, script: HandScript, arm: PersonArm = USUAL_ARM) -> None:
         """Attach to a plant whose scene has a hand; `arm` is what moves it."""
-        self._plant, self._script, self._arm, self._dt = plant, script, arm, plant.params.period_s
+        self._plant, self._script = plant, script
         body = plant.mj_model.body("hand")
         dof, data = int(plant.mj_model.body_dofadr[body.id]), plant.mj_data
+        own, links = slice(dof, dof + 3), slice(plant.first_body, None)
+        places, numbers = np.zeros((5, 3)), np.array([0.0, 0.0, 0.0, 0.0, *arm])
+        places[AT_HOME] = places[END] = body.pos
         # views into the simulation's memory, taken once
-        self._offset, self._velocity = data.qpos[dof : dof + 3], data.qvel[dof : dof + 3]
-        self._force = data.qfrc_applied[dof : dof + 3]
-        self._home = np.array(body.pos)
-        self._goal = self._home.copy()
+        views = data.qpos[own], data.qvel[own], data.qfrc_applied[own], data.xpos[links], data.xmat[links]
+        self._memory = plant.hand = HandMemory(*views, places, numbers)
         plant.before_each_step(self._drive)
 
     @property
     def position(self) -> FloatArray:
         """Position of the hand (3,) [m], base frame."""
-        return self._home + self._offset
+        return np.asarray(self._memory.places[AT_HOME] + self._memory.position)
 
     @property
     def velocity(self) -> FloatArray:
         """Velocity of the hand (3,) [m/s]."""
-        return self._velocity.copy()
+        return self._memory.velocity.copy()
 
-    def _drive(self, time: float) -> None:
-        position = self.position
-        goal = self._script.goal(time, position, self._plant)
-        _pull(self._goal, self._force, goal, position, self._velocity, self._dt, self._arm)
-
-
-@compiled
-def _pull(
-    last: FloatArray, force: FloatArray, goal: HandGoal, x: FloatArray, v: FloatArray, dt: float, arm: PersonArm
-) -> None:
-    """Move the spring's far end (3,) [m], which was at `last` a step before; write it and the force on the hand (3,).
-
-    The force is in N; x [m] and v [m/s] (3,) are the hand's position and velocity.
-    """
-    at = last + _shortened(goal.position - last, arm.speed_max * dt)
-    # never farther ahead than the largest force stretches the spring: a person who lets go pulls back at once
-    at = x + _shortened(at - x, goal.force_max / arm.stiffness)
-    pull = arm.stiffness * (at - x) + arm.damping * ((at - last) / dt - v)
-    force[:], last[:] = _shortened(pull, goal.force_max), at
-
-
-@kernel
-def _shortened(vector: FloatArray, length: float) -> FloatArray:
-    size = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
-    return vector if size <= length else vector * (length / size)
+    def _drive(self, time: float) -> float:
+        goal = self._script.goal(time, self.position, self._plant)
+        places, numbers = self._memory.places, self._memory.numbers
+        places[AIM], places[POINT], places[RATE] = goal.position, goal.point, goal.rate
+        numbers[:SPEED] = goal.link, time, goal.force_max, goal.way_round
+        return goal.until
 
 
 def point_on_arm(plant: Plant, link: int, offset: FloatArray) -> FloatArray:
@@ -105,8 +99,6 @@ def point_on_arm(plant: Plant, link: int, offset: FloatArray) -> FloatArray:
 
 HOME = np.array([1.2, 0.0, 0.8])
 """Where the person's hand rests [m]."""
-_AISLE_X_M = 1.15
-"""Plane in front of the Panda's reach in which a hand changes sides, so that it meets the arm only on purpose [m]."""
 _STAND_OFF_M = 0.5
 _SPEED_M_S = 0.35
 """Speed of a reaching hand relative to the arm [m/s]."""
@@ -118,15 +110,6 @@ LEAD_S = 4.0
 """Time before a push or visit in which the person brings the hand to the side it will come from [s]."""
 _PATIENCE_S = 5.0
 """Time after which a person who has not touched the arm gives up [s]."""
-
-
-def way_round(hand: FloatArray, goal: FloatArray) -> FloatArray:
-    """Next point (3,) [m] on a way from hand to goal (3,) [m] that does not cross the arm."""
-    x, y, z = hand.tolist()
-    aside = abs(y - goal[1])
-    if x < _AISLE_X_M - 0.1:
-        return goal if aside < 0.35 else np.array([_AISLE_X_M, y, z])
-    return np.array([_AISLE_X_M, goal[1], goal[2]]) if aside > 0.1 else goal
 
 
 @dataclass(frozen=True)
@@ -208,22 +191,28 @@ class Pusher:
 
         The direction follows the robot's hand as it turns until the touch, and stays from then on.
         """
-        number, withdrawing = len(self.contacts), time < self._release + 1.0
+        number, back = len(self.contacts), self._release + 1.0
         over = number == len(self.pushes)
-        if not withdrawing and (over or time < self.pushes[number].start - LEAD_S):
-            return HandGoal(way_round(hand, HOME), FREE_N)
+        start = np.inf if over else self.pushes[number].start
+        if time >= back and time < start - LEAD_S:
+            return HandGoal(HOME, FREE_N, way_round=True, until=start - LEAD_S)
         robot = self._robot
-        palm = point_on_arm(plant, robot.link, robot.palm)
-        if withdrawing:
-            return HandGoal(palm - _STAND_OFF_M * self._direction, FREE_N)
-        push = self.pushes[number]
+        if time < back:
+            return HandGoal(-_STAND_OFF_M * self._direction, FREE_N, robot.link, robot.palm, until=back)
+        push, inwards = self.pushes[number], self._ahead_of_palm[number] - robot.palm
+        before = robot.palm - _STAND_OFF_M * inwards
+        if time < start:
+            return HandGoal(_NONE, FREE_N, robot.link, before, way_round=True, until=start)
         if self._touch is None:
-            self._direction = point_on_arm(plant, robot.link, self._ahead_of_palm[number]) - palm
-        if time < push.start:
-            return HandGoal(way_round(hand, palm - _STAND_OFF_M * self._direction), FREE_N)
+            self._direction = plant.link_rotation[robot.link] @ inwards
         self._watch(time, push, plant)
-        ahead = _SPEED_M_S * (time - push.start) - _STAND_OFF_M
-        return HandGoal(palm + min(ahead, _STAND_OFF_M) * self._direction, push.force)
+        ahead = min(_SPEED_M_S * (time - start) - _STAND_OFF_M, _STAND_OFF_M)
+        if self._touch is not None or len(self.contacts) > number:
+            return HandGoal(ahead * self._direction, push.force, robot.link, robot.palm)
+        moving = ahead < _STAND_OFF_M
+        until = start + (2.0 * _STAND_OFF_M / _SPEED_M_S if moving else _PATIENCE_S)
+        rate = _SPEED_M_S * inwards if moving else _NONE
+        return HandGoal(_NONE, push.force, robot.link, robot.palm + ahead * inwards, rate, until=until)
 
     def _watch(self, time: float, push: Push, plant: Plant) -> None:
         """Notice the touch, and end the push after its time or when the person loses patience."""

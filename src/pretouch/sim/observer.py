@@ -8,7 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled
+from pretouch.robot.kinematics import Arm, Hinges, Kinematics, jacobian_into, place
 from pretouch.types import FloatArray
 
 
@@ -67,17 +69,35 @@ def observe(
     return ObserverState(residual, grown + residual * dt, mass_matrix)
 
 
+@compiled
 def wrench_from_torques(
-    jacobian: FloatArray, tau_ext: FloatArray, damping: float, smallest_singular_value: float
+    hinges: Hinges, arm: Arm, q: FloatArray, tau_ext: FloatArray, damping: float, smallest_singular_value: float
 ) -> FloatArray | None:
     """Wrench (6,) at the end-effector [N, Nm] that explains external joint torques, by damped least squares.
 
-    Solves tau_ext = J^T F for F in the frame of the Jacobian (6, n). Returns None where the smallest singular
-    value of J is below the given one: there a robot's interface has no estimate.
+    Solves tau_ext = J^T F, with the Jacobian J (6, n) at joint positions q (n,) [rad], for F in the base frame. Returns
+    None where the smallest singular value of J is below the given one: there a robot's interface has no estimate.
     """
-    # the eigenvalues of J J^T are the squared singular values of J; those that vanish may come out below zero
-    squares, vectors = np.linalg.eigh(jacobian @ jacobian.T)
-    if squares[0] < smallest_singular_value**2 or squares[0] <= 0:
+    links, n = len(hinges.parent), len(q)
+    kin = Kinematics(np.empty((links, 3)), np.empty((links, 3, 3)), np.empty((n, 3)), np.empty((n, 3)))
+    place(hinges, q, kin)
+    jacobian = np.empty((6, n))
+    jacobian_into(kin.anchor, kin.axis, arm.moved_by[arm.ee], kin.position[arm.ee], jacobian)
+    square, L, force = np.zeros((6, 6)), np.empty((6, 6)), np.zeros(6)
+    for i in range(6):
+        for j in range(n):
+            force[i] += jacobian[i, j] * tau_ext[j]
+            for k in range(6):
+                square[i, k] += jacobian[i, j] * jacobian[k, j]
+    # all singular values of J are above s where J J^T - s^2 I is positive definite
+    for i in range(6):
+        square[i, i] -= smallest_singular_value**2
+    if not factor(square, L):
         return None
-    # F = (J J^T + d^2 I)^-1 J tau, by the eigenvectors of J J^T
-    return np.asarray(vectors @ ((vectors.T @ (jacobian @ tau_ext)) / (squares + damping**2)))
+    # F = (J J^T + d^2 I)^-1 J tau
+    for i in range(6):
+        square[i, i] += smallest_singular_value**2 + damping**2
+    factor(square, L)
+    forward(L, force, force)
+    backward(L, force, force)
+    return force

@@ -5,12 +5,16 @@ Called one by one from Python, these cost more than twice what they compute.
 
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 
 from pretouch.compiled import compiled, entry, kernel
+from pretouch.robot.model import RobotModel
 from pretouch.sim.mujoco_calls import mj_comPos, mj_comVel, mj_crb, mj_fullM, mj_kinematics, mj_rne, mj_step
 from pretouch.sim.observer import ObserverState, observe
 from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.rays import Ranging, measure
+from pretouch.sim.scene import CONTACTS
 from pretouch.types import FloatArray
 
 
@@ -24,6 +28,27 @@ class Simulation(NamedTuple):
     qdd: FloatArray  # accelerations in the last step [rad/s^2]
     applied: FloatArray  # torques that act in the next step [Nm]
     contacts: FloatArray  # (1,) how many contacts there were in the last step
+
+
+class HandMemory(NamedTuple):
+    """A person's hand, in MuJoCo's memory, and what the person does with it; empty arrays where there is none."""
+
+    position: FloatArray  # (3,) away from its home [m]
+    velocity: FloatArray  # (3,) [m/s]
+    force: FloatArray  # (3,) on it in the next step [N]
+    link_position: FloatArray  # (L, 3) origins [m] of the arm's links
+    link_rotation: FloatArray  # (L, 9) rows of their rotation matrices
+    places: FloatArray  # (5, 3) rows below
+    numbers: FloatArray  # (7,) entries below
+
+
+AT_HOME, END, AIM, POINT, RATE = range(5)
+"""Rows of `HandMemory.places`: where the hand is at home, and where the far end of the spring is [m]; where the person
+wants the hand, seen from a point of a link [m]; that point at an instant, and how it moves on, frame of the link [m],
+[m/s]."""
+LINK, SINCE, FORCE, ROUND, SPEED, STIFFNESS, DAMPING = range(7)
+"""Entries of `HandMemory.numbers`: the link, the instant [s], the largest force [N], whether the hand goes round the
+arm; of the person's arm `hand.PersonArm`."""
 
 
 class NominalModel(NamedTuple):
@@ -53,6 +78,44 @@ class ArmMemory(NamedTuple):
     mass_matrix: FloatArray  # (n, n) of the nominal model [kg m^2]
 
 
+def memory_of(
+    built: mujoco.MjModel, data: mujoco.MjData, own: slice, model: RobotModel, p: PlantParams, phase: FloatArray
+) -> ArmMemory:
+    """Put together what physics steps take of an arm whose joints are `own` among MuJoCo's; stiffness and offset are 0.
+
+    `phase` (n,) is that of its joints' ripple [rad].
+    """
+    zero, q = np.zeros(model.n), data.qpos[own].copy()
+    mass, bias = model.mass_matrix_and_bias(q, zero, zero.copy())
+    # at rest the impedance settles where it holds what the model does not know; start there, not with a jerk
+    q_d = q + (data.qfrc_bias[own] - bias) / np.array(p.stiffness_nm_rad)
+    counted = int(built.sensor(CONTACTS).adr[0])
+    nominal, scratch = model.scratch
+    state = np.zeros((8, model.n))
+    state[SPRING] = state[BIAS] = bias
+    return ArmMemory(
+        p=p.numbers,
+        world=Simulation(
+            built._address, data._address, data.qpos[own], data.qvel[own], data.qacc[own], data.qfrc_applied[own],
+            data.sensordata[counted : counted + 1],
+        ),
+        nominal=NominalModel(nominal._address, scratch._address, scratch.qpos, scratch.qvel),
+        follow=1.0 - float(np.exp(-2 * np.pi * p.set_point_hz * p.period_s)),
+        keep=float(np.exp(-2 * np.pi * p.torque_noise_hz * p.period_s)),
+        turn=2 * np.pi * p.ring_hz * p.period_s,
+        figures=np.array([
+            model.description.tau_max, p.friction_f1_nm, p.friction_f2_s_rad, p.friction_f3_rad_s, p.ripple_nm,
+            p.ripple_cycles, phase,
+        ]),
+        impedance=np.zeros((3, model.n)),
+        offset=zero.copy(),
+        cold=np.array([p.cold_friction]),
+        report=np.array([q, zero, q_d, zero, zero]),
+        state=state,
+        mass_matrix=mass,
+    )  # fmt: skip
+
+
 Q, QD, Q_D, QD_SET, EXTERNAL = range(5)
 """Rows of `ArmMemory.report`."""
 QD_D, BRISTLE, NOISE, SPRING, GROWTH, BIAS, INTEGRAL, QD_BEFORE = range(8)
@@ -64,22 +127,73 @@ step [rad/s]."""
 
 @entry
 def take_steps(
-    first: int, last: int, velocity_noise: FloatArray, torque_noise: FloatArray, past: FloatArray, arm: ArmMemory
+    first: int,
+    times: FloatArray,
+    noise: FloatArray,
+    past: FloatArray,
+    arm: ArmMemory,
+    hand: HandMemory,
+    ranging: Ranging | None,
+    rng: np.random.Generator | None,
 ) -> int:
-    """Take some of S physics steps: from one to before another, or to the first after which something touches.
+    """Take physics steps from a number on, to the last, or to the first after which something touches.
 
-    Returns the number of the next. The noise is (S, n), [rad/s] and [Nm]. Into `past` (S, 5, n) comes the arm's report
+    Or while there is room for what range finders measure. Returns the number of the next. They begin at `times` (S,)
+    [s]. The noise (S', 2, n) is of velocities [rad/s] and torques [Nm]. Into `past` (S', 5, n) comes the arm's report
     after each step; (0, 5, n): nowhere.
     """
-    for step in range(first, last):
+    for step in range(first, len(times)):
+        if ranging is not None and rng is not None:
+            if ranging.rows[0] + len(ranging.silent) > len(ranging.sent):
+                return step
+            measure(times[step], ranging, rng)
+        if len(hand.force):
+            pull(hand, times[step], arm.p.period_s)
         tau, lost = begin_step(arm)
         mj_step(arm.world.model, arm.world.data)
-        end_step(arm, tau, lost, velocity_noise[step], torque_noise[step])
+        end_step(arm, tau, lost, noise[step, 0], noise[step, 1])
         if len(past):
             past[step] = arm.report
         if arm.world.contacts[0] > 0.0:
             return step + 1
-    return last
+    return len(times)
+
+
+@kernel
+def pull(hand: HandMemory, time: float, dt: float) -> None:
+    """Move the far end of the spring that the hand hangs on, and lay the spring's force on the hand."""
+    n, last, link = hand.numbers, hand.places[END], int(hand.numbers[LINK])
+    x, goal = hand.places[AT_HOME] + hand.position, hand.places[AIM] + hand.link_position[link]
+    for i in range(3):
+        for j in range(3):
+            point = hand.places[POINT, j] + hand.places[RATE, j] * (time - n[SINCE])
+            goal[i] += hand.link_rotation[link, 3 * i + j] * point
+    if n[ROUND] > 0.0:
+        goal = way_round(x, goal)
+    at = last + _shortened(goal - last, n[SPEED] * dt)
+    # never farther ahead than the largest force stretches the spring: a person who lets go pulls back at once
+    at = x + _shortened(at - x, n[FORCE] / n[STIFFNESS])
+    pulling = n[STIFFNESS] * (at - x) + n[DAMPING] * ((at - last) / dt - hand.velocity)
+    hand.force[:], hand.places[END] = _shortened(pulling, n[FORCE]), at
+
+
+@kernel
+def _shortened(vector: FloatArray, length: float) -> FloatArray:
+    size = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    return vector if size <= length else vector * (length / size)
+
+
+_AISLE_X_M = 1.15
+"""Plane in front of the Panda's reach in which a hand changes sides, so that it meets the arm only on purpose [m]."""
+
+
+@compiled
+def way_round(hand: FloatArray, goal: FloatArray) -> FloatArray:
+    """Next point (3,) [m] on a way from hand to goal (3,) [m] that does not cross the arm."""
+    aside = abs(hand[1] - goal[1])
+    if hand[0] < _AISLE_X_M - 0.1:
+        return goal if aside < 0.35 else np.array([_AISLE_X_M, hand[1], hand[2]])
+    return np.array([_AISLE_X_M, goal[1], goal[2]]) if aside > 0.1 else goal
 
 
 @compiled

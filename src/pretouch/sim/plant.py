@@ -12,9 +12,10 @@ import numpy as np
 from pretouch.errors import ParameterError
 from pretouch.robot.model import RobotModel
 from pretouch.sim.observer import wrench_from_torques
-from pretouch.sim.physics import BIAS, QD_BEFORE, QD_D, SPRING, ArmMemory, NominalModel, Simulation, take_steps
+from pretouch.sim.physics import BIAS, QD_BEFORE, QD_D, HandMemory, memory_of, take_steps
 from pretouch.sim.plant_params import Joints, PlantParams
-from pretouch.sim.scene import CONTACTS, ArmError, SceneSpec, build, stiffen
+from pretouch.sim.rays import Ranging
+from pretouch.sim.scene import ArmError, SceneSpec, build, stiffen
 from pretouch.sim.under_way import ROUNDING_S
 from pretouch.types import FloatArray, RobotState
 
@@ -75,9 +76,14 @@ class ArmInWorld:
     def before_each_step(self, call: Callable[[float], float | None]) -> None:
         """Have `call(time)` run before each physics step: hands and sensors are driven so.
 
-        It may return until when it has nothing to do [s]. While nobody has, steps are taken in one go.
+        It may return until when it has nothing to do, if nothing touches before [s]. While nobody has, steps are taken
+        in one go.
         """
         raise NotImplementedError
+
+    def measure_each_step(self, ready: Callable[[], Ranging], rng: np.random.Generator) -> bool:
+        """Have compiled code measure before each physics step with what `ready()` returns; say whether it will."""
+        return False
 
     def _enter(self, mj_model: mujoco.MjModel, mj_data: mujoco.MjData, joint: int, body: int, q: FloatArray) -> None:
         """Take the place of the arm whose first joint and world link have these indices; it is at q (n,) [rad]."""
@@ -95,7 +101,11 @@ class ArmInWorld:
         mujoco.mj_forward(mj_model, mj_data)
         self.stiffness = np.array(self.params.stiffness_nm_rad)
         """Of the joint impedance (n,) [Nm/rad]; `set_stiffness` changes it."""
-        self._arm = self._memory(own)
+        self._arm = memory_of(mj_model, mj_data, own, self.model, self.params, self._ripple_phase)
+        self._arm.impedance[:2], self._arm.offset[:] = self._spring_and_damper(self._arm.mass_matrix), self.offset_nm
+        # what is added to coloured noise at each step, so that its variance stays that of the sensor
+        torque_noise = np.array(self.params.torque_noise_nm) * np.sqrt(1 - self._arm.keep**2)
+        self._noise = np.array([np.full(self._n, self.params.velocity_noise_rad_s), torque_noise])
         self._measured_q, self._measured_qd, self._q_d, self._qd_set, _ = self._arm.report
         self._err = self._arm.offset
         delay = round(self.params.state_delay_s / self.params.period_s)
@@ -108,42 +118,6 @@ class ArmInWorld:
         self.touches: list[Touch] = []
         """Each beginning of a contact since then."""
         mujoco.mj_forward(mj_model, mj_data)
-
-    def _memory(self, own: slice) -> ArmMemory:
-        """Put together what physics steps take: `own` are the arm's joints among MuJoCo's."""
-        p, data, zero = self.params, self.mj_data, np.zeros(self._n)
-        q = data.qpos[own].copy()
-        mass, bias = self.model.mass_matrix_and_bias(q, zero, zero.copy())
-        # at rest the impedance settles where it holds what the model does not know; start there, not with a jerk
-        q_d = q + (data.qfrc_bias[own] - bias) / self.stiffness
-        keep = float(np.exp(-2 * np.pi * p.torque_noise_hz * p.period_s))
-        # what is added to coloured noise at each step, so that its variance stays that of the sensor
-        self._torque_noise = np.array(p.torque_noise_nm) * np.sqrt(1 - keep**2)
-        counted = int(self.mj_model.sensor(CONTACTS).adr[0])
-        nominal, scratch = self.model.scratch
-        state = np.zeros((8, self._n))
-        state[SPRING] = state[BIAS] = bias
-        return ArmMemory(
-            p=p.numbers,
-            world=Simulation(
-                self.mj_model._address, data._address, data.qpos[own], data.qvel[own], data.qacc[own],
-                data.qfrc_applied[own], data.sensordata[counted : counted + 1],
-            ),
-            nominal=NominalModel(nominal._address, scratch._address, scratch.qpos, scratch.qvel),
-            follow=1.0 - float(np.exp(-2 * np.pi * p.set_point_hz * p.period_s)),
-            keep=keep,
-            turn=2 * np.pi * p.ring_hz * p.period_s,
-            figures=np.array([
-                self.model.description.tau_max, p.friction_f1_nm, p.friction_f2_s_rad, p.friction_f3_rad_s,
-                p.ripple_nm, p.ripple_cycles, self._ripple_phase,
-            ]),
-            impedance=np.vstack([self._spring_and_damper(mass), zero]),
-            offset=self.offset_nm.copy(),
-            cold=np.array([p.cold_friction]),
-            report=np.array([q, zero, q_d, zero, zero]),
-            state=state,
-            mass_matrix=mass,
-        )  # fmt: skip
 
     def take_log(self) -> tuple[list[tuple[float, FloatArray]], list[Touch]]:
         """Return `true_log` and `touches`, and begin both anew: in a run without an end they would fill the memory."""
@@ -162,8 +136,8 @@ class ArmInWorld:
         p = self.params
         time, report = self._states[0] if p.state_delay_s else (self.time, self._arm.report.copy())
         q, qd, q_d, qd_set, tau_ext = report
-        kin = self.model.kinematics(q)
-        wrench = wrench_from_torques(self.model.ee_jacobian(kin), tau_ext, p.wrench_damping, p.singular_value_min)
+        hinges, arm = self.model.hinges, self.model.mechanism.arm
+        wrench = wrench_from_torques(hinges, arm, q, tau_ext, p.wrench_damping, p.singular_value_min)
         late = p.stamp_jitter_s * self._wander.uniform() if p.stamp_jitter_s else 0.0
         return RobotState(time + late, q, qd, q_d, qd_set, tau_ext, wrench)
 
@@ -261,14 +235,25 @@ class Plant(ArmInWorld):
         self.scene = scene
         self._before_step: list[Callable[[float], float | None]] = []
         self._idle_until: list[float] = []
+        self._ready: Callable[[], Ranging] | None = None
+        self._chance: np.random.Generator | None = None
         self.time = 0.0
-        built = build(model, scene, self.error)
+        built, none = build(model, scene, self.error), np.empty(0)
+        self.hand = HandMemory(none, none, none, np.empty((0, 3)), np.empty((0, 9)), np.empty((0, 3)), none)
+        """A person's hand; none yet."""
         self._enter(built, mujoco.MjData(built), 0, 0, q)
 
     def before_each_step(self, call: Callable[[float], float | None]) -> None:
         """Have `call(time)` run before each physics step, as `ArmInWorld` says."""
         self._before_step.append(call)
         self._idle_until.append(-np.inf)
+
+    def measure_each_step(self, ready: Callable[[], Ranging], rng: np.random.Generator) -> bool:
+        """Do so for the first to ask."""
+        if self._ready is not None:
+            return False
+        self._ready, self._chance = ready, rng
+        return True
 
     def stiffen(self, thing: str, stiffness: float) -> None:
         """Give the contacts with a thing of the scene, by name, another stiffness [N/m].
@@ -280,19 +265,21 @@ class Plant(ArmInWorld):
 
     def advance(self, duration: float) -> None:
         """Let time pass [s], in whole physics steps."""
-        p, n = self.params, self._n
+        p = self.params
         steps, done, noted = round(duration / p.period_s), 0, 0
-        draws = self._rng.standard_normal((steps, 2, n))
-        velocity_noise = p.velocity_noise_rad_s * draws[:, 0]
-        torque_noise = self._torque_noise * draws[:, 1]
-        past = np.empty((steps if p.state_delay_s else 0, 5, n))
+        noise = self._noise * self._rng.standard_normal((steps, 2, self._n))
+        past = np.empty((steps if p.state_delay_s else 0, 5, self._n))
         times = list(accumulate(repeat(p.period_s, steps), initial=self.time))
+        begins = np.array(times)
         self._age(duration)
         while done < steps:
             first, until = done, self._prepare_step()
             last = bisect_left(times, until, first + 1, steps)
-            done = take_steps(first, last, velocity_noise, torque_noise, past, self._arm)
+            ranging = self._ready() if self._ready else None
+            done = take_steps(first, begins[:last], noise, past, self._arm, self.hand, ranging, self._chance)
             self.time = times[done]
+            if self._arm.world.contacts[0]:
+                self._idle_until = [-np.inf] * len(self._before_step)
             if p.state_delay_s:
                 self._states.extend((times[step + 1], past[step]) for step in range(first, done))
             if done == steps or self._arm.world.contacts[0] or self.true_force is not _NO_FORCE:

@@ -7,15 +7,14 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
-from pretouch.compiled import compiled, kernel
 from pretouch.errors import ParameterError
 from pretouch.sensing.sensor import Capacitive, Sensor, cone_rays
 from pretouch.sensing.skin import Skin
 from pretouch.sim.capacitive import STREAM, Electrode
 from pretouch.sim.plant import ArmInWorld
-from pretouch.sim.rays import Geoms, cast, geoms_of, placed, turned
-from pretouch.sim.under_way import ROUNDING_S, UnderWay
-from pretouch.types import FloatArray, IntArray, RangeReadings, RangeStatus
+from pretouch.sim.rays import Finders, Ranging, deliver, geoms_of, measure
+from pretouch.sim.under_way import ROUNDING_S
+from pretouch.types import FloatArray, RangeReadings, RangeStatus
 
 
 @dataclass(frozen=True)
@@ -111,24 +110,38 @@ class RangeFinders:
         kinds = np.empty((count, 3))
         for k, sensor in enumerate(unit.sensor for unit in skin.units):
             kinds[k] = sensor.ranging(params.mode).distance_max_m, sensor.nearest_m, sensor.noise
-        self._finders = _Finders(
+        finders = Finders(
             data.xpos, data.xmat, bodies, skin.T_link_sensor, cones, np.column_stack([offset, flat_wall, kinds])
         )
-        self._geoms, drift = geoms, np.random.default_rng([seed, STREAM])
+        drift = np.random.default_rng([seed, STREAM])
         self._electrodes = {
             k: Electrode(unit.sensor, int(bodies[k]), skin.T_link_sensor[k], data, geoms, drift)
             for k, unit in enumerate(skin.units)
             if isinstance(unit.sensor, Capacitive)
         }
-        self._boards: list[list[int]] = [np.flatnonzero(skin.board == one).tolist() for one in range(len(skin.mounted))]
-        self._periods = [params.period_of(unit.sensor) for unit in skin.mounted]
-        self._due: list[float] = self._rng.uniform(0, self._periods, len(self._periods)).tolist()
-        self._sent = UnderWay[tuple[int, float, float, int]]()
+        period = self._all_periods()
+        self._ranging = Ranging(
+            p=params.numbers,
+            finders=finders,
+            geoms=geoms,
+            first=np.append(skin.first, count),
+            period=period,
+            due=self._rng.uniform(0, period),
+            silent=np.zeros(count, np.bool_),
+            sent=np.empty((4 * count, 8)),
+            rows=np.zeros(1, np.int64),
+            whole=send is not None or bool(self._electrodes),
+        )
         none = np.full(count, RangeStatus.NONE, dtype=np.int64)
         self._newest = RangeReadings(np.full(count, -np.inf), np.zeros(count), none)
         self.silenced: set[int] = set()
         """Indices of units that no longer send."""
-        plant.before_each_step(self._sample)
+        if self._ranging.whole or not plant.measure_each_step(self._ready, self._rng):
+            plant.before_each_step(self._sample)
+
+    def _all_periods(self) -> FloatArray:
+        """Time between readings of each unit (B,), all of its zones together [s]."""
+        return np.array([self.params.period_of(unit.sensor) for unit in self._skin.mounted])
 
     def change(self, params: RangeFinderParams) -> None:
         """Err in another way from the next measurement on; what was settled when they were mounted has to stay."""
@@ -137,35 +150,41 @@ class RangeFinders:
                 raise ParameterError(
                     f"RangeFinderParams.{name} cannot change while the sensors run: create them again."
                 )
-        self.params, self._periods = params, [params.period_of(unit.sensor) for unit in self._skin.mounted]
+        self.params = params
+        self._ranging = self._ranging._replace(p=params.numbers, period=self._all_periods())
 
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit that has arrived by now."""
-        newest = self._newest
-        for unit, stamp, distance, status in self._sent.arrived(self._plant.time + ROUNDING_S):
-            if stamp > newest.stamp[unit]:
-                newest.stamp[unit], newest.distance[unit], newest.status[unit] = stamp, distance, status
+        newest, sent, rows = self._newest, self._ranging.sent, self._ranging.rows
+        deliver(self._plant.time + ROUNDING_S, sent, rows, newest.stamp, newest.distance, newest.status)
         return RangeReadings(newest.stamp.copy(), newest.distance.copy(), newest.status.copy())
 
+    def _ready(self) -> Ranging:
+        """Return what `measure` takes, with room for a row of each sensor."""
+        self._ranging.silent[:] = False
+        self._ranging.silent[list(self.silenced)] = True
+        sent, rows = self._ranging.sent, self._ranging.rows
+        if 2 * rows[0] > len(sent):
+            self.read()
+            if 2 * rows[0] > len(sent):
+                self._ranging = self._ranging._replace(sent=np.vstack([sent, np.empty_like(sent)]))
+        return self._ranging
+
     def _sample(self, time: float) -> float:
-        p, rng, due = self.params, self._rng, list[tuple[int, float, float, bool]]()
-        for board in [board for board, due_at in enumerate(self._due) if due_at <= time]:
-            self._due[board] += self._periods[board] * (1.0 + p.period_jitter * rng.standard_normal())
-            units, draws = self._boards[board], rng.standard_normal(len(self._boards[board])).tolist()
-            arrival, lost = time + p.latency_s + rng.exponential(p.jitter_s), rng.random() < p.dropout
-            due += [(unit, draw, arrival, lost) for unit, draw in zip(units, draws, strict=True)]
-        measured = _measure(np.array(due).reshape(-1, 4), p.numbers, self._finders, self._geoms).tolist()
-        for (unit, draw, arrival, lost), (distance, status, sigma, strength) in zip(due, measured, strict=True):
+        """Measure with the units that are due, and do what compiled code does not."""
+        ranging = self._ready()
+        first = int(ranging.rows[0])
+        until = measure(time, ranging, self._rng)
+        for row in ranging.sent[first : ranging.rows[0]]:
+            unit = int(row[0])
             if unit in self._electrodes:
-                distance, status, sigma, strength = self._electrodes[unit].measure(time, draw)
-            if unit in self.silenced:
-                continue
-            if self._send:
-                light = _light(strength, self._light)
-                self._send(RangeSample(unit, time, distance, int(status), sigma, *light))
-            elif not lost:
-                self._sent.send(arrival, (unit, time, distance, int(status)))
-        return min(self._due, default=np.inf)
+                row[3:7] = self._electrodes[unit].measure(time, float(row[7]))
+            if self._send and unit not in self.silenced:
+                distance, status, sigma, strength = row[3:7].tolist()
+                self._send(RangeSample(unit, time, distance, int(status), sigma, *_light(strength, self._light)))
+        if self._send:
+            ranging.rows[0] = first
+        return until
 
 
 _SIGNAL_LIMIT_MCPS = 1.024
@@ -186,103 +205,3 @@ def _light(strength: float, rng: np.random.Generator) -> tuple[float, float, flo
     share = min(1.0, _WANTED_MCPS / float(rates.sum()))
     signal, ambient = (rng.poisson(1e6 * share * rates * _COUNTED_S) / (1e6 * _COUNTED_S)).tolist()
     return signal, ambient, _SPADS * share
-
-
-_OK, _SIGMA, _SIGNAL, _MIN_RANGE = (
-    int(s) for s in (RangeStatus.OK, RangeStatus.SIGMA, RangeStatus.SIGNAL, RangeStatus.MIN_RANGE)
-)
-
-
-class _Finders(NamedTuple):
-    """Where K sensors sit, and on what; and how the type of each measures."""
-
-    position: FloatArray  # (L, 3) origins of the bodies [m], in MuJoCo's memory
-    rotation: FloatArray  # (L, 9) rows of their rotation matrices
-    link: IntArray  # (K,)
-    T_link_sensor: FloatArray  # (K, 4, 4)
-    cone: FloatArray  # (K, N, 3) unit vectors of the rays, sensor frame
-    # (K, 5) constant error [m], factor that makes a flat wall read at its distance, farthest target [m], nearest [m],
-    # times the noise of the VL53L1X
-    figures: FloatArray
-
-
-@compiled
-def _measure(units: FloatArray, p: RangeFinderParams, finders: _Finders, geoms: Geoms) -> FloatArray:
-    """Measure with N sensors at once: (N, 4) are their numbers, a normal draw for each, and more.
-
-    Returns (N, 4): distance [m], status, standard deviation [m], and strength.
-    """
-    measured = np.empty((len(units), 4))
-    for row in range(len(units)):
-        distance, status, sigma, strength = _measured(int(units[row, 0]), units[row, 1], p, finders, geoms)
-        measured[row, 0], measured[row, 1], measured[row, 2], measured[row, 3] = distance, status, sigma, strength
-    return measured
-
-
-@kernel
-def _measured(
-    unit: int, draw: float, p: RangeFinderParams, finders: _Finders, geoms: Geoms
-) -> tuple[float, int, float, float]:
-    """Measure with a sensor; `draw` is normal. Return distance [m], status, standard deviation [m], and strength.
-
-    The nearest group of returns strong enough to be detected is reported. Strength falls with the square of the
-    distance and the cosine of incidence. It is relative to a target that is just detected: one that fills the cone, at
-    `distance_max`, square to the beam, of `reflectance_limit`, has 1 in all.
-    """
-    link, figures = finders.link[unit], finders.figures[unit]
-    offset, calibration, distance_max, noise = figures[0], figures[1], figures[2], figures[4]
-    origin, R = placed(finders.position[link], finders.rotation[link], finders.T_link_sensor[unit])
-    rays = turned(R, finders.cone[unit])
-    distance, normal, _ = cast(origin, rays, geoms, link, distance_max)
-    brightness, count = p.reflectance / p.reflectance_limit, len(distance)
-    strength = np.zeros(count)
-    for i in range(count):
-        if 0.0 <= distance[i] <= distance_max:
-            # a ray that leaves a body began inside it: what presses on the sensor is at 0, not where the ray comes out
-            outwards = rays[i, 0] * normal[i, 0] + rays[i, 1] * normal[i, 1] + rays[i, 2] * normal[i, 2]
-            slant = abs(outwards)
-            if outwards > 0:
-                distance[i] = 0.0
-            if p.slant_power != 1.0:
-                slant = slant**p.slant_power
-            ratio = distance_max / max(distance[i], 0.01)  # 10 mm: no return is infinitely strong
-            strength[i] = brightness * slant * ratio * ratio / count
-    total, mean = _nearest_group(distance, strength, p.merge_m)
-    if total == 0.0:
-        return 0.0, _SIGNAL, 0.0, sum(strength)
-    mean *= calibration / total
-    # shot noise: with a share of the light that a target filling the cone would return, 1 / sqrt(share) times the noise
-    full = brightness * (distance_max / max(mean, 0.01)) ** 2
-    sigma = p.noise_floor_m + p.noise_rate * mean * np.sqrt(max(1.0, full / total))
-    trusted = sigma <= p.sigma_limit_m
-    sigma *= noise
-    measured = max(0.0, mean + offset + sigma * draw)
-    if not trusted:
-        return measured, _SIGMA, sigma, total
-    if measured < figures[3]:
-        return measured, _MIN_RANGE, sigma, total
-    return measured, _OK, sigma, total
-
-
-@kernel
-def _nearest_group(distance: FloatArray, strength: FloatArray, merge_m: float) -> tuple[float, float]:
-    """Strength of the nearest group of returns that is detected, and the sum of strength times distance; or zeros.
-
-    A weak group hides nothing that is behind it.
-    """
-    start = 0.0
-    while True:
-        nearest = np.inf
-        for i in range(len(distance)):
-            if strength[i] > 0 and start <= distance[i] < nearest:
-                nearest = distance[i]
-        if nearest == np.inf:
-            return 0.0, 0.0
-        total, mean = 0.0, 0.0
-        for i in range(len(distance)):
-            if nearest <= distance[i] <= nearest + merge_m:
-                total += strength[i]
-                mean += strength[i] * distance[i]
-        if total >= 1.0:
-            return total, mean
-        start = nearest + merge_m

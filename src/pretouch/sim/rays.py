@@ -1,17 +1,18 @@
-"""Rays into a simulated room: MuJoCo's own geometry, for geoms that a ray can meet at all.
+"""Rays into a simulated room, and what range finders make of them.
 
+The geometry is MuJoCo's own, for geoms that a ray can meet at all.
 A handful of rays from one place meets few of them. MuJoCo's function for many rays first finds, for each geom, between
 which angles it is seen, which costs more than the rays.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
-from pretouch.compiled import kernel
+from pretouch.compiled import compiled, entry, kernel
 from pretouch.sim.mujoco_calls import mj_rayHfield, mj_rayMesh, mju_rayGeom
-from pretouch.types import FloatArray, IntArray
+from pretouch.types import BoolArray, FloatArray, IntArray, RangeStatus
 
 _MESH, _HFIELD = int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_HFIELD)
 _MARGIN_M2 = 1e-9
@@ -114,3 +115,147 @@ def cast(
                 nearest[k], struck[k] = distance, geom
                 normal[k] = there
     return nearest, normal, struck
+
+
+class Finders(NamedTuple):
+    """Where K sensors sit, and on what; and how the type of each measures."""
+
+    position: FloatArray  # (L, 3) origins of the bodies [m], in MuJoCo's memory
+    rotation: FloatArray  # (L, 9) rows of their rotation matrices
+    link: IntArray  # (K,)
+    T_link_sensor: FloatArray  # (K, 4, 4)
+    cone: FloatArray  # (K, N, 3) unit vectors of the rays, sensor frame
+    # (K, 5) constant error [m], factor that makes a flat wall read at its distance, farthest target [m], nearest [m],
+    # times the noise of the VL53L1X
+    figures: FloatArray
+
+
+class Ranging(NamedTuple):
+    """The K sensors of a skin of B units, when they measure, and what is on its way."""
+
+    p: Any  # numbers of `RangeFinderParams`
+    finders: Finders
+    geoms: Geoms
+    first: IntArray  # (B + 1,) first sensor of each unit, and K
+    period: FloatArray  # (B,) [s]
+    due: FloatArray  # (B,) when each measures next [s]
+    silent: BoolArray  # (K,) whether each no longer sends
+    sent: FloatArray  # (M, 8) sensor, when [s], arrival [s], distance [m], status, its deviation [m], strength, draw
+    rows: IntArray  # (1,) how many of these rows there are
+    whole: bool  # whether what never arrives is there, too: its arrival is infinite
+
+
+_OK, _SIGMA, _SIGNAL, _MIN_RANGE = (
+    int(s) for s in (RangeStatus.OK, RangeStatus.SIGMA, RangeStatus.SIGNAL, RangeStatus.MIN_RANGE)
+)
+
+
+@compiled
+def measure(time: float, ranging: Ranging, rng: np.random.Generator) -> float:
+    """Measure with the units that are due at an instant, and return when the next will be [s].
+
+    There has to be room for a row of each sensor.
+    """
+    p, due, rows = ranging.p, ranging.due, ranging.rows
+    for unit in range(len(due)):
+        if due[unit] > time:
+            continue
+        due[unit] += ranging.period[unit] * (1.0 + p.period_jitter * rng.standard_normal())
+        first, last = ranging.first[unit], ranging.first[unit + 1]
+        draws = np.empty(last - first)
+        for i in range(len(draws)):
+            draws[i] = rng.standard_normal()
+        arrival = time + p.latency_s + rng.exponential(p.jitter_s)
+        if rng.random() < p.dropout:
+            arrival = np.inf
+        for k in range(first, last):
+            if ranging.whole or (arrival < np.inf and not ranging.silent[k]):
+                row = ranging.sent[rows[0]]
+                rows[0] += 1
+                row[0], row[1], row[2], row[7] = k, time, np.inf if ranging.silent[k] else arrival, draws[k - first]
+                row[3], row[4], row[5], row[6] = _measured(k, row[7], p, ranging.finders, ranging.geoms)
+    return due.min() if len(due) else np.inf
+
+
+@entry
+def deliver(
+    now: float, sent: FloatArray, rows: IntArray, stamp: FloatArray, distance: FloatArray, status: IntArray
+) -> None:
+    """Bring what has arrived by now [s] to the newest readings (K,), and forget what never does."""
+    left = 0
+    for row in sent[: rows[0]]:
+        if row[2] <= now:
+            k = int(row[0])
+            if row[1] > stamp[k]:
+                stamp[k], distance[k], status[k] = row[1], row[3], int(row[4])
+        elif row[2] < np.inf:
+            sent[left] = row
+            left += 1
+    rows[0] = left
+
+
+@kernel
+def _measured(unit: int, draw: float, p: Any, finders: Finders, geoms: Geoms) -> tuple[float, int, float, float]:
+    """Measure with a sensor; `draw` is normal. Return distance [m], status, standard deviation [m], and strength.
+
+    The nearest group of returns strong enough to be detected is reported. Strength falls with the square of the
+    distance and the cosine of incidence. It is relative to a target that is just detected: one that fills the cone, at
+    `distance_max`, square to the beam, of `reflectance_limit`, has 1 in all.
+    """
+    link, figures = finders.link[unit], finders.figures[unit]
+    offset, calibration, distance_max, noise = figures[0], figures[1], figures[2], figures[4]
+    origin, R = placed(finders.position[link], finders.rotation[link], finders.T_link_sensor[unit])
+    rays = turned(R, finders.cone[unit])
+    distance, normal, _ = cast(origin, rays, geoms, link, distance_max)
+    brightness, count = p.reflectance / p.reflectance_limit, len(distance)
+    strength = np.zeros(count)
+    for i in range(count):
+        if 0.0 <= distance[i] <= distance_max:
+            # a ray that leaves a body began inside it: what presses on the sensor is at 0, not where the ray comes out
+            outwards = rays[i, 0] * normal[i, 0] + rays[i, 1] * normal[i, 1] + rays[i, 2] * normal[i, 2]
+            slant = abs(outwards)
+            if outwards > 0:
+                distance[i] = 0.0
+            if p.slant_power != 1.0:
+                slant = slant**p.slant_power
+            ratio = distance_max / max(distance[i], 0.01)  # 10 mm: no return is infinitely strong
+            strength[i] = brightness * slant * ratio * ratio / count
+    total, mean = _nearest_group(distance, strength, p.merge_m)
+    if total == 0.0:
+        return 0.0, _SIGNAL, 0.0, sum(strength)
+    mean *= calibration / total
+    # shot noise: with a share of the light that a target filling the cone would return, 1 / sqrt(share) times the noise
+    full = brightness * (distance_max / max(mean, 0.01)) ** 2
+    sigma = p.noise_floor_m + p.noise_rate * mean * np.sqrt(max(1.0, full / total))
+    trusted = sigma <= p.sigma_limit_m
+    sigma *= noise
+    measured = max(0.0, mean + offset + sigma * draw)
+    if not trusted:
+        return measured, _SIGMA, sigma, total
+    if measured < figures[3]:
+        return measured, _MIN_RANGE, sigma, total
+    return measured, _OK, sigma, total
+
+
+@kernel
+def _nearest_group(distance: FloatArray, strength: FloatArray, merge_m: float) -> tuple[float, float]:
+    """Strength of the nearest group of returns that is detected, and the sum of strength times distance; or zeros.
+
+    A weak group hides nothing that is behind it.
+    """
+    start = 0.0
+    while True:
+        nearest = np.inf
+        for i in range(len(distance)):
+            if strength[i] > 0 and start <= distance[i] < nearest:
+                nearest = distance[i]
+        if nearest == np.inf:
+            return 0.0, 0.0
+        total, mean = 0.0, 0.0
+        for i in range(len(distance)):
+            if nearest <= distance[i] <= nearest + merge_m:
+                total += strength[i]
+                mean += strength[i] * distance[i]
+        if total >= 1.0:
+            return total, mean
+        start = nearest + merge_m

@@ -7,7 +7,7 @@ import numpy as np
 
 from pretouch.perception.closest import closest_points
 from pretouch.robot.model import RobotModel
-from pretouch.sim.hand import FREE_N, HOME, LEAD_S, HandGoal, point_on_arm, robot_hand, way_round
+from pretouch.sim.hand import FREE_N, HOME, LEAD_S, HandGoal, point_on_arm, robot_hand
 from pretouch.sim.paper_scenes import Placement
 from pretouch.sim.plant import Plant
 from pretouch.sim.scene import HandSpec, SceneSpec
@@ -61,8 +61,8 @@ class Visitor:
                 clear = np.linalg.norm(palm - visit.place) > _CLEAR_M
                 due = visit.arrive <= time < visit.leave
                 self._inside = due and (self._inside or bool(clear))
-                return HandGoal(visit.place if self._inside else way_round(hand, outside), FREE_N)
-        return HandGoal(way_round(hand, HOME), FREE_N)
+                return HandGoal(visit.place if self._inside else outside, FREE_N, way_round=not self._inside)
+        return HandGoal(HOME, FREE_N, way_round=True)
 
 
 def cells(options: Options) -> list[Row]:
