@@ -116,8 +116,7 @@ class Detection(InWorlds):
 class Avoidance(InWorlds):
     """How near arms come to people and objects, with what forces, and what it costs to keep clear of them.
 
-    About ten minutes on two processors, with --quick one. A run that was stopped goes on with the same
-    --out.
+    About ten minutes on two processors, with --quick one. A run that was stopped goes on with the same --out.
     """
 
     baselines: Annotated[Words, tyro.conf.arg(aliases=["--contenders"])] = ()
