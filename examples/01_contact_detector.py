@@ -26,7 +26,7 @@ for name, near in {"nothing near": pt.no_obstacles(), "a hand 0.2 m away at +y":
     window = pt.window_init(params.samples)
     for i, sample in enumerate(force):
         armed, window = window.full, pt.add_force(window, sample, params)
-        found = detector.judged(window, sample, armed, ee, near)
+        found = detector.judge(window, sample, armed, ee, near)
         if found.contact is not None:
             crossed = f"{window.newest[1]:.1f} N in y, filtered, is beyond {found.thresholds.lower[1]:.1f} N"
             said = f"contact {i - 300} samples after the push began: {crossed}"

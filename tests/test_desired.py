@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch import desired
-from pretouch.control.commander import _nearer, rotation_about
+from pretouch.control.commander import _rotation_towards, rotation_about
 from pretouch.desired import Desired, DesiredKind
 from pretouch.errors import ParameterError
 from pretouch.profiles import profile
@@ -140,7 +140,7 @@ def test_a_far_orientation_is_approached_the_short_way(seed):
     axis /= np.linalg.norm(axis)
     R, angle = rotation_about(rng.permutation(np.eye(3))[0], rng.uniform(0, 3)), rng.choice([0.5, 2.0, np.pi])
     goal = rotation_about(axis, angle) @ R
-    nearer = _nearer(R, goal)
+    nearer = _rotation_towards(R, goal)
     np.testing.assert_allclose(nearer @ nearer.T, np.eye(3), atol=1e-9)
     left = np.arccos(np.clip((np.trace(goal @ nearer.T) - 1.0) / 2.0, -1.0, 1.0))
     assert left == pytest.approx(max(0.0, angle - 1.0) if angle > 1.0 else 0.0, abs=1e-5)

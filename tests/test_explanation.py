@@ -32,7 +32,7 @@ def step() -> ControlStep:
     parts[0], parts[1], parts[2] = 11.0, -9.0, 1.0
     free = QpSolution(np.full(7, 0.2), np.zeros(0), np.zeros(7), QpOutcome.SOLVED, "solved")
     return ControlStep(
-        stamp=4.0, mode=Mode.TRACK, event=Event.CLEAR, detail="", reason="Moving as asked.", latched=False,
+        stamp=4.0, mode=Mode.TRACK, event=Event.CLEAR, detail="", reason="Moving as requested.", latched=False,
         q=np.zeros(7), q_commanded=np.zeros(7),
         ee_position=np.array([0.5, 0.25, 0.25]), ee_velocity=AHEAD, path_position=np.array([0.5, 0.25, 0.25]),
         path_phase=1.0, desired_velocity=AHEAD, speed_scale=1.0, range_distance=np.full(2, np.nan), obstacles=seen(),
@@ -54,9 +54,9 @@ def test_an_arm_that_nothing_limits_says_its_speed_or_place_and_what_it_sees(ste
     loose = said(step, **seen_too, qp=limited(multiplier=0.0))
     assert loose.sentence == "Moving at 0.30 m/s: hand_left sees something at 0.15 m."
     rest = replace(step, desired_velocity=np.zeros(3), ee_velocity=np.zeros(3))
-    assert said(rest) == Explanation(Doing.MOVING, "In its place: nothing near is seen.")
+    assert said(rest) == Explanation(Doing.MOVING, "In position: nothing near is seen.")
     assert explain(step, (), LINKS).sentence == "Moving at 0.30 m/s: no sensor unit is in use."
-    assert explain(rest, (), LINKS).sentence == "In its place: no sensor unit is in use."
+    assert explain(rest, (), LINKS).sentence == "In position: no sensor unit is in use."
 
 
 def test_an_arm_too_loud_for_a_light_push_says_what_it_finds(step: ControlStep) -> None:
@@ -72,7 +72,7 @@ def test_eq_3_is_said_with_its_factor_and_the_unit_nearest_to_the_end_effector(s
     found = said(step, obstacles=seen((1, 0.5, 0.1, 1), (0, 0.136, 0.18, 2)), **slowed)
     assert found == Explanation(Doing.SLOWED, "Slowed to 17 %: hand_front sees something at 0.18 m.")
     gone = said(step, **slowed)
-    why = "what was seen has gone from view, a unit is late, or none looks where it goes"
+    why = "an obstacle is out of view, a unit is late, or none covers the direction of motion"
     assert gone == Explanation(Doing.SLOWED, f"Slowed to 17 %: {why}.")
     outside = said(step, obstacles=seen((2, 0.4, 0.3, 2)), speed_scale=0.5)
     assert outside.sentence == "Slowed to 50 %: an outside source sees something at 0.30 m."
@@ -112,7 +112,7 @@ def test_a_row_that_limits_the_direction_alone_names_unit_and_link(step: Control
 
 
 def test_an_arm_kept_off_its_path_says_by_what_and_how_far_and_never_that_it_follows(step: ControlStep) -> None:
-    # the page's old sentence at 0.05 m/s, pushed off the path: "Moving as asked."
+    # the page's old sentence at 0.05 m/s, pushed off the path: "Moving as requested."
     off = {"path_position": step.ee_position + np.array([0.0, 0.0, 0.12]), "obstacles": seen((1, 0.2, 0.06, 2))}
     near = {"restricted": np.array([0]), "approach_limit": np.array([0.02]), "qp": limited(slack=0.01)}
     found = said(step, **off, **near, desired_velocity=AHEAD / 6, ee_velocity=np.array([0.0, 0.05, 0.0]))
@@ -120,7 +120,7 @@ def test_an_arm_kept_off_its_path_says_by_what_and_how_far_and_never_that_it_fol
     still = said(step, **off, **near, ee_velocity=np.array([0.0, 0.01, 0.0]))
     assert still == Explanation(
         Doing.BLOCKED,
-        "At rest 0.12 m from its path: hand_left sees something at 0.06 m. It goes on when the way is clear.",
+        "At rest 0.12 m from its path: hand_left sees something at 0.06 m. It continues when the way is clear.",
     )
     assert said(step, path_position=off["path_position"]) == Explanation(
         Doing.RETURNING, "Returning to its path, 0.12 m away."
@@ -134,7 +134,7 @@ def test_an_arm_kept_off_its_path_says_by_what_and_how_far_and_never_that_it_fol
 def test_an_arm_at_rest_before_something_says_what(step: ControlStep) -> None:
     found = said(step, obstacles=seen((0, 0.02, -0.01, 2)), speed_scale=0.02, ee_velocity=np.array([0.004, 0.0, 0.0]))
     assert found == Explanation(
-        Doing.BLOCKED, "At rest: hand_front sees something at 0.00 m. It goes on when the way is clear."
+        Doing.BLOCKED, "At rest: hand_front sees something at 0.00 m. It continues when the way is clear."
     )
 
 
@@ -176,7 +176,7 @@ def test_a_new_contact_is_said_by_its_force_and_one_that_has_ended_with_what_fol
     assert new == Explanation(Doing.TOUCHED, "Touched with 10 N.")
     over = {"touched": step.touched, "evidence": 0.2}
     ended = touched(step, **over, command=np.zeros(7))
-    assert ended == Explanation(Doing.WAITING, "The push has ended. The task goes on 1 s after the last push.")
+    assert ended == Explanation(Doing.WAITING, "The push has ended. The task continues 1 s after the last push.")
     eq_12 = touched(step, **over, event=Event.REACTING, detail="1.20 s")
     assert eq_12 == Explanation(Doing.YIELDING, "Moving the way it was pushed: 1.20 s left.")
 
@@ -190,12 +190,12 @@ def test_a_force_without_a_place_is_the_estimate_less_its_mean_and_nothing_where
 
 
 def test_a_clamp_is_said_as_such(step: ControlStep) -> None:
-    reason = "Clamped between two objects (5.0 Nm against the direction it yielded in): opening the way it came."
+    reason = "Clamped between two objects (5.0 Nm against the direction of yielding): opening along its path."
     assert touched(step, event=Event.OPENING, reason=reason) == Explanation(Doing.CAUGHT, reason)
 
 
 def test_a_hold_says_its_cause_and_is_a_stop_where_a_person_has_to_resume(step: ControlStep) -> None:
-    silent = "No usable reading from hand_left: check it; the arm goes on when it is heard again."
+    silent = "No usable reading from hand_left: check it; the arm continues when it reports again."
     assert said(step, mode=Mode.HOLD, event=Event.SKIN_SILENT, reason=silent) == Explanation(Doing.WAITING, silent)
     tries = "Given up after 3 contacts: clear it; the arm tries again when 30 s have passed, or on resume."
     assert said(step, mode=Mode.HOLD, event=Event.GIVEN_UP, reason=tries).doing is Doing.STOPPED

@@ -87,7 +87,7 @@ def fails(monkeypatch: pytest.MonkeyPatch, function: str, error: OSError) -> Non
     ("function", "error", "wish", "words"),
     [
         ("scheduler", NOT_ALLOWED, {"priority": 80}, "Real-time priority 80 was refused.*rtprio 99.*limits.conf.*CAP_"),
-        ("scheduler", INVALID, {"priority": 1}, r"Real-time priority 1 is not to be had here \(Invalid argument\)"),
+        ("scheduler", INVALID, {"priority": 1}, r"Real-time priority 1 is not available here \(Invalid argument\)"),
         ("affinity", INVALID, {"cpu": CPU}, rf"Staying on processor {CPU} was refused \(Invalid argument\)"),
     ],
 )
@@ -125,8 +125,8 @@ def test_the_process_stays_on_a_processor_meanwhile():
     [
         ({"priority": 0}, "The real-time priority is 0: give 1 to 99."),
         ({"priority": 100}, "The real-time priority is 100: give 1 to 99."),
-        ({"cpu": -1}, "Processor -1 is none this process may use: choose from "),
-        ({"cpu": 100_000}, "Processor 100000 is none this process may use: choose from "),
+        ({"cpu": -1}, "Processor -1 is not available to this process: choose from "),
+        ({"cpu": 100_000}, "Processor 100000 is not available to this process: choose from "),
     ],
 )
 def test_wishes_that_cannot_be_name_the_range(wish: dict[str, int], words: str):
@@ -169,7 +169,7 @@ class Arm(World):
 def test_the_runner_prepares_tells_and_reports(controller: Controller, monkeypatch: pytest.MonkeyPatch):
     fails(monkeypatch, "sched_setaffinity", INVALID)
     clock, told, arm = MonotonicClock(0.001), [], Arm(controller)
-    options = realtime.Options(cpu=CPU, tell=told.append)
+    options = realtime.RealTimeOptions(cpu=CPU, tell=told.append)
     realtime.run(controller, arm, arm.skin(), clock, arm, lambda step: len(arm.steps) == 20, options)
     assert len(told) == 1
     assert arm.collecting == [False] * 20

@@ -134,7 +134,7 @@ def test_another_number_of_places_begins_anew(panda_model, paper_skin):
     arm.step(points=seen(arm.time, arm.ee() + np.array([0.0, 0.3, 0.0])))
     one = replace(PRETOUCH, perception=replace(PRETOUCH.perception, outside=OutsidePoints(per_link=1)))
     other = controller_of(panda_model, paper_skin, one)
-    assert np.isnan(other.adopt(arm.state, arm.controller).memory.get("outside.heard"))
+    assert np.isnan(other.adopt(arm.state, arm.controller).memory.get("outside.source_stamp"))
     arm.state, arm.controller = other.adopt(arm.state, arm.controller), other
     step = arm.step(points=seen(arm.time, arm.ee() + np.array([0.0, 0.3, 0.0])))
     assert (step.obstacles.unit >= 7).any()
@@ -147,7 +147,7 @@ def test_time_that_goes_backwards_forgets_what_a_source_showed(panda_model, pape
     assert (arm.step(points=seen(arm.time, arm.ee() + np.array([0.0, 0.3, 0.0]))).obstacles.unit >= 7).any()
     arm.time -= 0.5
     assert not (arm.step(points=seen(arm.time)).obstacles.unit >= 7).any()
-    assert arm.state.memory.get("outside.heard") < arm.time
+    assert arm.state.memory.get("outside.source_stamp") < arm.time
 
 
 def test_warming_up_knows_of_points_and_leaves_the_arm_as_it_is(panda_model, paper_skin):
@@ -216,7 +216,7 @@ def test_silence_of_who_tells_holds_the_arm_until_it_is_told_for_the_first_time_
     arm = Arm(panda_model, paper_skin, PRETOUCH)
     steps = [arm.step(moving=SOMEWHERE) for _ in range(9)]
     assert {step.mode for step in steps} == {Mode.HOLD}
-    assert "have not been told of yet" in steps[-1].reason
+    assert "have not been reported yet" in steps[-1].reason
     for _ in range(150):
         step = arm.step(moving=rod(5.0, 0.0, arm.time))
     assert step.mode is Mode.TRACK
@@ -225,7 +225,7 @@ def test_silence_of_who_tells_holds_the_arm_until_it_is_told_for_the_first_time_
         step = arm.step(moving=rod(5.0, 0.0, told))
     assert step.mode is Mode.HOLD
     assert step.reason == (
-        "The fixtures that move were last known 0.070 s ago: check who tells of them; the arm goes on when it is told"
+        "The moving fixtures were last reported 0.070 s ago: check their source; the arm continues when it reports"
         " again."
     )
     assert arm.step(moving=rod(5.0, 0.0, arm.time)).mode is Mode.TRACK

@@ -35,8 +35,7 @@ def recorded(controller: Controller, monkeypatch: pytest.MonkeyPatch) -> list[Co
 
 
 @pytest.mark.parametrize(
-    ("name", "rate"),
-    [("paper", 1000.0), ("blind", 100.0), ("paper:approach.rows=hard", 100.0), ("pretouch", 1000.0)],
+    ("name", "rate"), [("paper", 1000.0), ("blind", 100.0), ("paper:approach.rows=hard", 100.0), ("pretouch", 1000.0)]
 )
 def test_a_warm_up_sees_every_mode(panda_model, paper_skin, robot: RobotState, monkeypatch, name: str, rate: float):
     controller = controller_of(panda_model, paper_skin, at_rate(profile(name), rate))

@@ -1,6 +1,6 @@
 """Contact-anticipating control for robot arms with onboard proximity sensing.
 
-What a program of your own needs is here by name and loaded when it is asked for: `import pretouch` loads nothing. The
+The public names are attributes of this module and are loaded at their first use: `import pretouch` loads nothing. The
 names stand in `__init__.pyi`. (PYTEST_DONT_REWRITE: a program that has imported this and then begins a test run is not
 warned that pytest came too late to rewrite assertions.)
 """
@@ -22,9 +22,9 @@ def __getattr__(name: str) -> object:
     if name not in _PLACE:
         raise AttributeError(f"module 'pretouch' has no attribute {name!r}")
     place = _PLACE[name]
-    found = import_module(f"pretouch.{name}") if place == __name__ else getattr(import_module(place), name)
-    globals()[name] = found
-    return found
+    attribute = import_module(f"pretouch.{name}") if place == __name__ else getattr(import_module(place), name)
+    globals()[name] = attribute
+    return attribute
 
 
 def __dir__() -> list[str]:

@@ -14,7 +14,7 @@ _SMALLEST, _LARGEST = 1e-6, 1e6
 
 
 def is_number(value: object) -> bool:
-    """Whether a value is a finite number that a float can hold: a text may have whole numbers of any size."""
+    """Return whether a value is a finite number that a float can hold: a text may have whole numbers of any size."""
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
@@ -49,19 +49,19 @@ PositiveCount = Annotated[int, Check(low=1)]
 
 
 class _NumbersOf:
-    """Makes the record of a parameter set's plain numbers when it is first asked for."""
+    """Makes the record of a parameter set's plain numbers at its first use."""
 
     def __get__(self, _instance: object, owner: type) -> Any:
         return _numbers_of(owner)
 
 
 class Checked:
-    """Base of parameter sets: checks every field when it is made."""
+    """Base of parameter sets: checks every field at construction."""
 
     Numbers: ClassVar[Any] = _NumbersOf()
-    """The set as compiled code sees it: a `NamedTuple` of its numbers; what may be none, texts and sets are left out.
+    """The set in compiled code: a `NamedTuple` of its numbers, without optional values, texts and other sets.
 
-    A compiled function says that it takes the set itself: its fields have the same names."""
+    A compiled function annotates the set itself: the fields have the same names."""
 
     def __post_init__(self) -> None:
         kind: Any = type(self)

@@ -1,4 +1,4 @@
-"""Small dense linear algebra, written to what is given: NumPy's would cost more than the arithmetic."""
+"""Small dense linear algebra in place: NumPy's functions would cost more than the arithmetic."""
 
 import math
 

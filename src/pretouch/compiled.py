@@ -1,4 +1,4 @@
-"""Compiled numerical functions, kept between runs wherever the machine has a place to keep them."""
+"""Compiled numerical functions, cached between runs where the machine has a place for the cache."""
 
 import logging
 import sys
@@ -20,30 +20,30 @@ Function = TypeVar("Function", bound=Callable[..., object])
 
 
 def compiled(function: Function) -> Function:
-    """Compile a function at its first call, for the types it is called with.
+    """Compile a function at its first call, for the types of its arguments.
 
     A division by zero in it gives an infinite or undefined number, as in NumPy, and no exception. The machine code is
-    kept beside the module, or in the user's cache where an installation is read-only. Where neither can be written it
-    is compiled anew in each process: that takes seconds, and works.
+    cached beside the module, or in the user's cache where an installation is read-only. Where neither can be written,
+    each process compiles anew: that takes seconds, and works.
     """
     return cast(Function, _dispatcher(function))
 
 
 def entry(function: Function) -> Function:
-    """Compile a function that Python calls and compiled ones do not: what is kept of it loads in half of the time."""
+    """Compile a function that only Python calls: its cached machine code loads in half of the time."""
     return cast(Function, _dispatcher(function, "-entry"))
 
 
 def kernel(function: Function) -> Function:
-    """Make a function part of compiled ones: without what a call from Python needs, a third of the time to compile.
+    """Compile a function that compiled ones call: without the wrapper for Python in a third of the time.
 
-    A call from Python, as a test makes, compiles it once more.
+    A call from Python, as in a test, compiles it once more.
     """
     return cast(Function, wraps(function)(_Kernel(function)))
 
 
 class _Kernel:
-    """Compiles a function for compiled ones, and anew for Python, when they first call it."""
+    """Compiles a function for compiled callers and for Python, each at the first call."""
 
     def __init__(self, function: Callable[..., object]) -> None:
         self._function = function
@@ -58,49 +58,49 @@ class _Kernel:
 
     @cached_property
     def _numba_type_(self) -> types.Dispatcher:
-        """What compiled code takes the function for; the type does not hold what it is of."""
+        """Numba type of the function; a type keeps no reference to its dispatcher."""
         self._within = _dispatcher(self._function, "-within", no_cpython_wrapper=True, no_cfunc_wrapper=True)
         return types.Dispatcher(self._within)
 
 
 def _dispatcher(function: Callable[..., object], kind: str = "", **options: bool) -> Any:
-    """Return what compiles a function when it is called, or takes what was kept of that."""
-    kept: Any = cast(Any, njit)(error_model="numpy", **options)(function)
-    # Numba looks at the function's own file only to tell whether what it kept is out of date. What got into a function
-    # from another file, a constant or a call, it would go on using as it was: so the name it keeps it under tells all.
+    """Return a dispatcher, which compiles a function at a call or loads its cached machine code."""
+    dispatcher: Any = cast(Any, njit)(error_model="numpy", **options)(function)
+    # Numba checks only the function's own file for changes. It would go on with old constants and functions from other
+    # files: so the cached name contains the digest of them all.
     name = function.__qualname__
-    with suppress(RuntimeError, SourceError):  # nowhere to keep it, or no text to tell whether it is out of date
+    with suppress(RuntimeError, SourceError):  # no place for a cache, or no source text for a digest
         function.__qualname__ = f"{name}-{source_digest(function)[:12]}{kind}"
-        kept._cache = _Cache(function)  # type: ignore[no-untyped-call]
-        kept._cache.linked = kind != "-entry"
+        dispatcher._cache = _Cache(function)  # type: ignore[no-untyped-call]
+        dispatcher._cache.linked = kind != "-entry"
     function.__qualname__ = name
-    return kept
+    return dispatcher
 
 
 def inlined(function: Function) -> Function:
-    """Make a function part of the compiled one that calls it, at one place: large groups are not copied to it.
+    """Compile a function into its only compiled caller: large groups of arguments are then not copied.
 
-    It is compiled there alone. Elsewhere it would only make the machine code longer, and what does not fit the
-    processor's cache is slow.
+    With several callers it would make the machine code longer, and code that does not fit the processor's cache is
+    slow.
     """
     return cast(Function, njit(error_model="numpy", inline="always")(function))
 
 
 LEVEL, _LEVEL_HAS = "x86-64-v3", {"avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"}
-"""Processors that a wheel's machine code is for, of 2013 and later, and what they can do."""
+"""Processors of a wheel's machine code, of 2013 and later, and their features."""
 
 
 class _Cache(FunctionCache):
-    """Numba's cache, with less to do where all is kept."""
+    """Numba's cache, faster where all functions are cached."""
 
     linked = True
-    """Whether compiled functions call it; else only the names of what it defines are kept beside the machine code."""
+    """True if compiled functions call it; otherwise the machine code is cached with the names of its symbols only."""
 
     _shipped = False
-    """Whether a wheel's machine code is looked for."""
+    """True while the machine code of a wheel is looked up."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Load machine code: what Numba's own registers before, all that can be compiled, takes a tenth of a second."""
+        """Load machine code, without Numba's registration of all types, which takes a tenth of a second."""
         rtsys.initialize(target_context)
         with self._guard_against_spurious_io_errors():
             overload = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
@@ -115,7 +115,7 @@ class _Cache(FunctionCache):
         return sig, (triple, LEVEL, "") if self._shipped else (triple, *host), code
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Let a full disk be no reason to stop: Numba raises where it cannot write what it just compiled."""
+        """Save machine code; a full disk, for which Numba raises an error, does not stop the program."""
         if not self.linked:
             module = data.library._get_module_for_linking()
             names = [part.name for part in (*module.functions, *module.global_variables) if not part.is_declaration]
@@ -129,22 +129,22 @@ _LARGE = ("line", "perceive", "assess_sample", "move_within")
 
 
 class FirstStart(event.Listener):
-    """Says once that something large is compiled, to the logger `pretouch`: a warning to people at a terminal."""
+    """Logs once that a large function is compiled, to the logger `pretouch`: a warning at a terminal."""
 
-    said = False
-    """Whether somebody has said it."""
+    logged = False
+    """True after the message."""
 
     def on_start(self, event: event.Event) -> None:
-        """Say it, where nobody has."""
-        if not self.said and event.data["dispatcher"].py_func.__name__ in _LARGE:
-            self.said = True
+        """Log the message at the first large function."""
+        if not self.logged and event.data["dispatcher"].py_func.__name__ in _LARGE:
+            self.logged = True
             self.say("Compiling for this processor, once after an installation: about a minute ...")
 
     def on_end(self, event: event.Event) -> None:
-        """Nothing: others may follow."""
+        """Do nothing: more functions may follow."""
 
     def say(self, sentence: str) -> None:
-        """Log a sentence; a command puts something else in its place."""
+        """Log a sentence; a command replaces this method."""
         level = logging.WARNING if sys.stderr and sys.stderr.isatty() else logging.INFO
         logging.getLogger("pretouch").log(level, sentence)
 

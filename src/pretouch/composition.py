@@ -1,7 +1,7 @@
-"""Frozen sets of parameters that hold others: nested, optional, or a choice of parts. As text and as plain tables.
+"""Frozen sets of parameters that contain others: nested, optional, or a choice of parts. As text and as plain tables.
 
-A part is a set of parameters with behaviour, chosen by name: `class MyDetector(Detector, name="mine")`. A subclass with
-a name is known from its definition on; parts of other distributions are found through the entry points of their group.
+A part is a set of parameters with behaviour, chosen by name: `class MyDetector(Detector, name="mine")`. The definition
+of a subclass with a name registers it; parts of other distributions are loaded by the entry points of their group.
 """
 
 import ast
@@ -19,7 +19,7 @@ from pretouch.errors import ParameterError
 from pretouch.plugins import load, names
 
 NONE = ("none", "off")
-"""What stands for a part or group that is left out."""
+"""Texts for a part or group that is left out."""
 _PART = "part"
 """Key of a part's name in a table."""
 _BOOLEANS = {"yes": True, "true": True, "no": False, "false": False}
@@ -30,43 +30,43 @@ class Part(Checked):
 
     group: ClassVar[str] = ""
     name: ClassVar[str] = ""
-    """What the part is called in texts and recordings."""
-    known: ClassVar[dict[str, "type[Part]"]]
-    """Parts of the interface that have been defined, by name."""
+    """Name of the part in texts and recordings."""
+    registry: ClassVar[dict[str, "type[Part]"]]
+    """Parts of the interface with a definition, by name."""
     State: ClassVar[type] = NoneType
-    """What the part remembers from one step to the next, if that is more than one value: a class made of fields."""
+    """Class of the part's state between steps, if it is more than one value: a class with fields."""
     interfaces: ClassVar[dict[str, "type[Part]"]] = {}
     """Interfaces by group."""
 
     def __init_subclass__(cls, name: str = "", group: str = "") -> None:
         super().__init_subclass__()
         if group:
-            cls.group, cls.known, cls.interfaces[group] = group, {}, cls
+            cls.group, cls.registry, cls.interfaces[group] = group, {}, cls
         if name:
-            other = cls.known.setdefault(name, cls)
+            other = cls.registry.setdefault(name, cls)
             if (other.__module__, other.__qualname__) != (cls.__module__, cls.__qualname__):
                 both = f"{other.__qualname__} and {cls.__qualname__}"
                 raise ParameterError(f"{both} have the name {name!r}: rename one.")
-            cls.name, cls.known[name] = name, cls
+            cls.name, cls.registry[name] = name, cls
 
     @classmethod
     def of_kind(cls, part: object) -> Self:
-        """Return a part if it is one of this class, or else one with default parameters."""
+        """Return a part if it is of this class, otherwise one with default parameters."""
         return part if isinstance(part, cls) else cls()
 
     @classmethod
     def choices(cls) -> tuple[str, ...]:
-        """Names of all parts that implement this interface."""
-        return tuple(dict.fromkeys((*cls.known, *names(cls.group))))
+        """Return the names of all parts of this interface."""
+        return tuple(dict.fromkeys((*cls.registry, *names(cls.group))))
 
     @classmethod
     def called(cls, name: str) -> "type[Part]":
-        """Return the part of a name; a ParameterError names those there are."""
-        if name not in cls.known and name in names(cls.group):
+        """Return the part of a name; for an unknown one, a ParameterError lists the names."""
+        if name not in cls.registry and name in names(cls.group):
             load(cls.group, name)
-        if name not in cls.known:
+        if name not in cls.registry:
             raise ParameterError(f"There is no {cls.__name__} called {name!r}: choose from {', '.join(cls.choices())}.")
-        return cls.known[name]
+        return cls.registry[name]
 
 
 def as_table(value: object) -> Any:
@@ -78,9 +78,9 @@ def as_table(value: object) -> Any:
 
 
 def from_table(hint: Any, table: Any, where: str = "") -> Any:
-    """Make the parameters of a type from what `as_table` returned.
+    """Make the parameters of a type from a table of `as_table`.
 
-    Raises ParameterError for a value that does not belong there, and for names that only one of the two has.
+    Raises ParameterError for a wrong value, and for names that only the type or only the table has.
     """
     kind, optional = _without_none(hint)
     if table is None and optional:
@@ -101,19 +101,19 @@ def from_table(hint: Any, table: Any, where: str = "") -> Any:
 
 
 def _plain(kind: Any, value: Any, where: str) -> Any:
-    """Refuse a number where there is a text or a yes or no, and the other way round."""
+    """Refuse a number for a text or a boolean, and the other way round."""
     kind = str if get_origin(kind) is Literal else kind
     for other in (bool, str):
         if isinstance(value, other) != (kind is other):
-            raise ParameterError(f"{where.lstrip('.')} is {value!r}: that is none of its values.")
+            raise ParameterError(f"{where.lstrip('.')} is {value!r}: give a value of its type.")
     return value
 
 
 def changed(value: Any, changes: Mapping[str, str], where: str = "") -> Any:
-    """Return parameters with some changed: path -> text, as `detect.window_s` -> `0.5` or `detect` -> `thresholds`.
+    """Return parameters with changes: path -> text, as `detect.window_s` -> `0.5` or `detect` -> `thresholds`.
 
-    A choice of a part comes before the changes of its own parameters, and all changes of a set are made at once, for
-    some are only allowed together. Raises ParameterError for a parameter there is not, or a value it does not allow.
+    A part is chosen before its own parameters change, and all changes of a set apply at once, for some are only allowed
+    together. Raises ParameterError for an unknown parameter, or a value that is not allowed.
     """
     trees: dict[str, dict[str, str]] = {}
     for path, text in changes.items():
@@ -130,8 +130,12 @@ def changed(value: Any, changes: Mapping[str, str], where: str = "") -> Any:
         if tree:
             if not is_dataclass(now):
                 first = next(iter(kind.choices())) if _is_part(kind) else "on"
-                why = f"{path} is none: choose it first, as {path}={first}" if now is None else f"{path} is one value"
-                raise ParameterError(f"{path}.{next(iter(tree))} cannot be set, for {why}.")
+                why = (
+                    f"{path} is none: choose it first, as {path}={first}"
+                    if now is None
+                    else f"{path} is a single value"
+                )
+                raise ParameterError(f"{path}.{next(iter(tree))} cannot be set, because {why}.")
             now = changed(now, tree, path)
         new[name] = now
     return replace(value, **new) if new else value
@@ -151,7 +155,7 @@ def leaves(params: Any, where: str = "") -> Iterator[tuple[str, object]]:
 
 @cache
 def field_docs(kind: type) -> Mapping[str, str]:
-    """Return what the source says of each field of a dataclass, by name, on one line; inherited ones too."""
+    """Return the docstring of each field of a dataclass, by name, on one line; inherited ones too."""
     docs: dict[str, str] = {}
     for base in filter(is_dataclass, reversed(kind.__mro__)):
         (node,) = ast.parse(inspect.getsource(base)).body
@@ -174,7 +178,7 @@ def describe(params: Any) -> str:
 
 
 def at(value: Any, path: str, where: str = "") -> Any:
-    """Return what stands at a path; a ParameterError where nothing does."""
+    """Return the parameter or set at a path; an unknown path is a ParameterError."""
     first, _, rest = path.partition(".")
     here, kind = f"{where}.{first}" if where else first, value.__class__
     names_here = hints_of(kind, False) if is_dataclass(value) else {}
@@ -185,7 +189,7 @@ def at(value: Any, path: str, where: str = "") -> Any:
 
 
 def _read(hint: Any, text: str, where: str, now: object = None) -> Any:
-    """Read a value of a type. A part or group that is chosen again keeps its parameters."""
+    """Read a value of a type. A part or group that is chosen once more keeps its parameters."""
     kind, optional = _without_none(hint)
     if optional and text in NONE:
         return None
@@ -212,7 +216,7 @@ def _read(hint: Any, text: str, where: str, now: object = None) -> Any:
 
 
 def differences(mine: Any, other: Any, where: str = "") -> Iterator[str]:
-    """Write what `changed` needs to make one set of parameters out of another, as PATH=VALUE."""
+    """Yield the changes that turn one set of parameters into another, as PATH=VALUE for `changed`."""
     for f in fields(mine):
         path, a, b = f"{where}.{f.name}" if where else f.name, getattr(mine, f.name), getattr(other, f.name)
         if a == b:
@@ -237,7 +241,7 @@ def _written(value: object) -> str:
 
 
 def _without_none(hint: Any) -> tuple[Any, bool]:
-    """Return a type without None, and whether None was allowed."""
+    """Return a type without None, and whether it had None."""
     if get_origin(hint) in (Union, UnionType):
         (left,) = (inner for inner in get_args(hint) if inner is not NoneType)
         return left, True

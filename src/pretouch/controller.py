@@ -1,8 +1,8 @@
 """From a reading to a joint velocity.
 
 `Controller.step(state, inputs) -> (ControlStep, state)` is pure: no clock, no file, no memory beside the state. Nearly
-every step is one call of `line`. Where something happened, a part is in plain Python, or inputs are out of the usual,
-`decision` takes the same stages one by one.
+every step is one call of `line`. After an event, with a part in plain Python or with rare inputs, `decision` takes the
+same stages one by one.
 """
 
 from dataclasses import replace
@@ -34,20 +34,20 @@ from pretouch.values import value
 
 @value
 class ControllerState:
-    """All the controller remembers from one step to the next."""
+    """Memory of the controller from one step to the next."""
 
     memory: Flat
-    """What compiled code remembers, see `line_records.Remembered`."""
+    """Memory of compiled code, see `line_records.Remembered`."""
     mode: ModeState
     detector: object
-    """What the profile's detector remembers beside that."""
+    """Other state of the profile's detector."""
     reaction: object
     approach: object
-    """What the profile's restriction remembers beside that."""
+    """Other state of the profile's restriction."""
     load: LoadState | None
-    """What was announced of a load; None before anything was."""
+    """Announced load; None before the first announcement."""
     calm: bool
-    """Whether the next step may be one call."""
+    """True if the next step may be one call."""
 
     @property
     def phase(self) -> float:
@@ -56,20 +56,20 @@ class ControllerState:
 
     @property
     def robot(self) -> RobotState:
-        """The arm's state that was believed last."""
+        """The last state of the arm that was plausible."""
         return robot_of(self.memory.part("watch.robot", Report))
 
     @property
     def learnt(self) -> ResidualModel:
-        """What the sequential detector has learnt of free motion."""
+        """The sequential detector's model of free motion."""
         return self.memory.part("test.model", ResidualModel)
 
 
 class Controller:
-    """The line from readings to joint velocities for one arm, skin, surrounding, path and profile.
+    """Computes joint velocities from readings, for one arm, skin, surroundings, path and profile.
 
-    `step` believes any finite report of the arm, and a false one can move it against its acceleration limits: a loop of
-    your own calls `loop.turn` in its place, or `loop.explained` before it.
+    `step` accepts any finite report of the arm, and a false one can move it against its acceleration limits: a loop of
+    your own calls `loop.turn` instead, or `loop.explained` before it.
     """
 
     def __init__(self, model: RobotModel, skin: Skin, fixtures: Fixtures, path: Path, profile: Profile) -> None:
@@ -82,22 +82,22 @@ class Controller:
         self.kinds, self.most_kg = kinds_of(profile), most_kg(model)
         self.motion_body = MotionBody(model, len(skin), self.limits, profile.task)
         self.approach = profile.approach if self.kinds.approach == PYTHON else None
-        """A restriction in plain Python; None of one that is compiled."""
+        """A restriction in plain Python; None if it is compiled."""
         self._begin_approach = None if self.approach is None else self.approach.init(self.motion_body)
         self.touching = profile.detect.reads_touch and len(skin.touching) > 0
         self.outside_places = profile.outside_per_link * len(model.parts)
-        """How many points of outside sources are kept."""
+        """Largest number of outside points."""
         self.beside = fixtures.capsules
         self.fixed, self._begin = Flat.of(fixed_of(self)), Flat.of(remembered_init(self))
         self.blank = now = Flat.of(now_init(self))
-        """What a step begins with: not written to."""
+        """Values that each step starts from; not written to."""
         self._usual = UsualInputs(now)
         self._on_path = slice(now.places["path.phase"].at.start, now.places["path.tangent"].at.stop)
 
     def init(self, robot: RobotState, learnt: ResidualModel | None = None) -> ControllerState:
-        """Return the state before the first step; a robot state that cannot be used is a RobotStateError.
+        """Return the state before the first step; an unusable robot state is a RobotStateError.
 
-        `learnt` is the arm's free motion as an earlier session left it, for a detector that learns it.
+        `learnt` is the model of free motion from an earlier session, for a detector that learns one.
         """
         sound, wrong = sound_robot(robot, self.limits.qd_max)
         if sound is None:
@@ -107,15 +107,15 @@ class Controller:
         memory.put("command", sound.qd_commanded)
         memory.get("mass.path")[:] = sound.q_commanded
         memory.put("rotation_goal", self.model.kinematics(sound.q).rotation[self.model.ee])
-        detector = self.kept_detector(memory, self.profile.detect.init(self.body, learnt))
+        detector = self.store_detector(memory, self.profile.detect.init(self.body, learnt))
         reaction = self.profile.react.init(self.body, sound.q_commanded)
         return ControllerState(memory, mode_init(), detector, reaction, self._begin_approach, None, False)
 
     def adopt(self, state: ControllerState, before: "Controller") -> ControllerState:
-        """Go on from a state of another controller of the same arm and skin, with this one's profile and path.
+        """Continue from a state of another controller of the same arm and skin, with this one's profile and path.
 
-        A force window of another length, and another method of detection, begin anew; another path is joined where it
-        is nearest, and the speed along it grows from 0. A reaction that is over stays so.
+        A force window of another length and another detector start anew. The arm joins another path at its nearest
+        point, and the speed along it grows from 0. A reaction that is over stays so.
         """
         mine, theirs, memory = self.profile, before.profile, self._begin.copy()
         remembered = before.with_places(state.memory)
@@ -140,19 +140,17 @@ class Controller:
         if same_window:
             detector = mine.detect.adopted(before.whole_detector(state), self.body, theirs.detect)
         reaction = mine.react.adopted(state.reaction, self.body, theirs.react, watch.robot.q_commanded)
-        return replace(
-            state, memory=memory, detector=self.kept_detector(memory, detector), reaction=reaction,
-            approach=state.approach if mine.approach == theirs.approach else self._begin_approach,
-            calm=False,
-        )  # fmt: skip
+        approach = state.approach if mine.approach == theirs.approach else self._begin_approach
+        detector = self.store_detector(memory, detector)
+        return replace(state, memory=memory, detector=detector, reaction=reaction, approach=approach, calm=False)
 
     def step(self, state: ControllerState, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
-        """Run one control cycle, once a period, with the state of the step before; it believes any finite report."""
+        """Run one control cycle, once a period, with the state of the step before; any finite report is accepted."""
         remembered = self.with_places(state.memory)
         memory = remembered.copy()
         if state.calm:
             now = self.blank.copy()
-            if self._usual.copied(now, inputs):
+            if self._usual.copy(now, inputs):
                 self.put_path(now, remembered.get("pace.phase"))
                 approach, part = state.approach, self.approach
                 calm = self.take(memory, now, self.beside, CHECK, MOVE if part is None else ASK)
@@ -163,34 +161,34 @@ class Controller:
                         memory, CLEAR, state.detector, state.reaction, approach, None, True
                     )
                 memory = remembered.copy()
-        step, after = Decision(self, state, memory).taken(inputs)
+        step, after = Decision(self, state, memory).run(inputs)
         return step, ControllerState(memory, **after)
 
     def take(self, memory: Flat, now: Flat, beside: Capsules, first: int, last: int) -> bool:
-        """Take stages of a step; see `line`."""
+        """Run stages of a step; see `line`."""
         return line(self.fixed.blocks, memory.blocks, now.blocks, beside, first, last)
 
     def put_path(self, now: Flat, phase: float) -> None:
-        """Write where the path is at an arc length [m]."""
+        """Write point and tangent of the path at an arc length [m]."""
         at = now.blocks[0][self._on_path]
         at[0], at[1:4], at[4:] = phase, self.path.point(phase), self.path.tangent(phase)
 
     def whole_detector(self, state: ControllerState) -> Any:
-        """Return all that the detector remembers."""
-        kept: Any = state.detector
+        """Return the whole state of the detector, with its part in the memory of compiled code."""
+        detector: Any = state.detector
         if self.kinds.detect != SEQUENTIAL:
-            return kept
-        return replace(kept, test=self.with_places(state.memory).part("test", SequentialState))
+            return detector
+        return replace(detector, test=self.with_places(state.memory).part("test", SequentialState))
 
-    def kept_detector(self, memory: Flat, state: Any) -> Any:
-        """Keep what compiled code remembers of a detector; return the rest."""
+    def store_detector(self, memory: Flat, state: Any) -> Any:
+        """Write the part of a detector's state that compiled code keeps to memory; return the rest."""
         if self.kinds.detect != SEQUENTIAL:
             return state
         memory.fill("test", state.test)
         return replace(state, test=None)
 
     def with_places(self, memory: Flat) -> Flat:
-        """Return what is remembered with the places of its fields, which a recording does not have."""
+        """Return a memory with the places of its fields, which a recording does not store."""
         if memory.places is self._begin.places:
             return memory
         if [len(block) for block in memory.blocks] != [len(block) for block in self._begin.blocks]:

@@ -1,4 +1,4 @@
-"""What a commander asks of the arm: a twist, joint velocities, a pose or joint positions, now or over a horizon."""
+"""Desired motion, from a commander: a twist, joint velocities, a pose or joint positions, now or over a horizon."""
 
 from enum import IntEnum
 from typing import Annotated
@@ -11,7 +11,7 @@ from pretouch.values import LARGEST, LATEST, FloatArray, real, value
 
 
 class DesiredKind(IntEnum):
-    """What the numbers are."""
+    """Quantity that a desired motion gives."""
 
     TWIST = 0
     """(6,) velocity of the end-effector origin [m/s] and angular velocity [rad/s], base frame."""
@@ -25,19 +25,19 @@ class DesiredKind(IntEnum):
 
 @value
 class Desired:
-    """A desired motion of M instants; made by `twist`, `joint_velocities`, `pose` or `joint_positions`.
+    """A desired motion of M instants, from `twist`, `joint_velocities`, `pose` or `joint_positions`.
 
-    At each step counts what is asked for that instant: between positions it is interpolated, and their difference is
-    the speed; a velocity holds until the next. After the last instant it counts for `failure.desired_timeout_s`.
+    Each step takes the value for its own instant: positions are interpolated, and their difference is the speed; a
+    velocity holds until the next one. The last value is valid for `failure.desired_timeout_s`.
     """
 
     kind: DesiredKind
     stamp: Annotated[FloatArray, "M", LATEST]
     """(M,) instants, increasing, by the clock of the steps [s]."""
     number: Annotated[FloatArray, "M", "w", LARGEST]
-    """(M, w) what is asked, see `DesiredKind`."""
+    """(M, w) desired values, see `DesiredKind`."""
     refused: str = ""
-    """Why what was asked is none, found where it came in: the arm holds, and says this."""
+    """Reason why the request could not be read, '' if it could: the arm holds and shows this."""
 
 
 def twist(stamp: ArrayLike, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> Desired:
@@ -47,31 +47,31 @@ def twist(stamp: ArrayLike, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0
     profile more than `task.orientation_gain_1_s` [rad/s].
     """
     v, w = np.atleast_2d(real(linear)), np.atleast_2d(real(angular))
-    return _made(DesiredKind.TWIST, stamp, np.hstack([v, np.broadcast_to(w, v.shape)]))
+    return _desired(DesiredKind.TWIST, stamp, np.hstack([v, np.broadcast_to(w, v.shape)]))
 
 
 def joint_velocities(stamp: ArrayLike, qd: ArrayLike) -> Desired:
     """Ask for joint velocities (n,) [rad/s], or (M, n) with M stamps."""
-    return _made(DesiredKind.JOINT_VELOCITIES, stamp, np.atleast_2d(real(qd)))
+    return _desired(DesiredKind.JOINT_VELOCITIES, stamp, np.atleast_2d(real(qd)))
 
 
 def pose(stamp: ArrayLike, T_O_ee: ArrayLike) -> Desired:
     """Ask for a pose T_O_ee (4, 4) of the end-effector in the base frame, or (M, 4, 4) with M stamps."""
     T = real(T_O_ee).reshape(-1, 4, 4)
-    return _made(DesiredKind.POSE, stamp, np.hstack([T[:, :3, 3], T[:, :3, :3].reshape(-1, 9)]))
+    return _desired(DesiredKind.POSE, stamp, np.hstack([T[:, :3, 3], T[:, :3, :3].reshape(-1, 9)]))
 
 
 def joint_positions(stamp: ArrayLike, q: ArrayLike) -> Desired:
     """Ask for joint positions (n,) [rad], or (M, n) with M stamps."""
-    return _made(DesiredKind.JOINT_POSITIONS, stamp, np.atleast_2d(real(q)))
+    return _desired(DesiredKind.JOINT_POSITIONS, stamp, np.atleast_2d(real(q)))
 
 
 def refused(stamp: float, reason: str) -> Desired:
-    """Ask for nothing, for a reason that a person reads: what came in at an instant [s] could not be used."""
+    """Return a motion in place of a request of an instant [s] that could not be used; a person reads the reason."""
     return Desired(DesiredKind.TWIST, np.array([stamp]), np.zeros((1, 6)), reason)
 
 
-def _made(kind: DesiredKind, stamp: ArrayLike, number: FloatArray) -> Desired:
+def _desired(kind: DesiredKind, stamp: ArrayLike, number: FloatArray) -> Desired:
     stamps = np.atleast_1d(real(stamp))
     if stamps.shape != number.shape[:1]:
         raise ParameterError(f"A desired motion has {stamps.size} stamps and {len(number)} rows: give one stamp a row.")

@@ -29,7 +29,7 @@ class SkinError(PretouchError, ValueError):
 
 
 class FixtureError(PretouchError, ValueError):
-    """What is said to stand around the arm is not well defined."""
+    """A fixture around the arm is not well defined."""
 
 
 class PathError(PretouchError, ValueError):
@@ -37,27 +37,27 @@ class PathError(PretouchError, ValueError):
 
 
 class ExperimentError(PretouchError, ValueError):
-    """An experiment was asked for something it cannot do."""
+    """An experiment cannot be run with these options."""
 
 
 class SourceError(PretouchError, LookupError):
-    """Source text that kept results rest on cannot be found."""
+    """Source text on which stored results depend cannot be found."""
 
 
 class RecordingError(PretouchError, ValueError):
-    """A recording cannot be made, opened or used as asked."""
+    """A recording cannot be written, opened or used as requested."""
 
 
 class HardwareError(PretouchError, RuntimeError):
-    """Sensor units, their keys, or the network between cannot be used as asked."""
+    """Sensor units, their keys, or their network cannot be used as requested."""
 
 
 class RobotError(PretouchError, RuntimeError):
-    """A real arm, or the connection to it, cannot be used as asked."""
+    """A real arm, or the connection to it, cannot be used as requested."""
 
 
 class CalibrationError(PretouchError, ValueError):
-    """A calibration, or the motion for it, cannot be had as asked."""
+    """A calibration, or the motion for it, is not possible as requested."""
 
 
 class ViewerError(PretouchError, RuntimeError):
@@ -65,7 +65,7 @@ class ViewerError(PretouchError, RuntimeError):
 
 
 class UsageError(PretouchError, ValueError):
-    """The words of a command line do not fit it."""
+    """The arguments of a command line are wrong."""
 
 
 class PluginError(PretouchError, RuntimeError):

@@ -1,4 +1,4 @@
-"""What the arm does, what limits it and how far: as values, and as one word and one sentence of a control step."""
+"""Explanation of a control step: the limit and its share as values, and the motion in one word and one sentence."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,60 +14,60 @@ if TYPE_CHECKING:
     from pretouch.types import ControlStep
 
 FULL = 0.95
-"""Share of the speed asked for from which on the arm is not called slowed: what a joint velocity's noise leaves."""
+"""Share of the desired speed from which the arm is not called slowed: less is the noise of the joint velocities."""
 ASKED_M_S = 0.005
-"""Speed from which on a motion is asked for [m/s]."""
+"""Speed from which a motion is desired [m/s]."""
 _PRESSED = 1e-9
-"""Multiplier above which a limit is pressed against."""
+"""Multiplier above which a limit is active."""
 OFF_PATH_M = 0.01
-"""Distance from the path at which the arm is off it [m]; following it takes less."""
+"""Distance from the path at which the arm is off it [m]; an arm that follows the path stays closer."""
 _REST_M_S = 0.015
-"""Speed of the end-effector below which it rests [m/s], of a measured velocity with its noise."""
+"""Measured speed of the end-effector below which it is at rest [m/s]; the rest is noise."""
 _REST_RAD_S = 0.01
 """Largest commanded joint velocity of an arm that is held still [rad/s]: 5 mm/s at half a metre."""
 _ANSWER_M_S = 1e-3
 """Speed of the end-effector from which on a reaction moves the arm [m/s]."""
 LOUD_N = 15.0
-"""Force that should be found; where it takes more, the arm is too loud [N]: a hand that touches lightly has less."""
+"""Force that a detector should find [N]: where it needs more, the torques are too noisy for light touches."""
 
 
 class Limit(Enum):
-    """What keeps the arm from what is asked."""
+    """Limit that keeps the arm from the desired motion."""
 
     NOTHING = "nothing"
     SLOWED = "slowed"
-    """It is slower near what is seen (eqs. 3, 4), or where units or outside sources are silent."""
+    """The arm is slower near an obstacle (eqs. 3, 4), or because units or outside sources are silent."""
     APPROACH = "approach"
-    """A link may come no faster towards what is seen (eqs. 5-7), or has to back away."""
+    """A link may approach an obstacle no faster (eqs. 5-7), or has to retreat."""
     JOINTS = "joints"
     """A joint is at its limit of position, velocity or acceleration."""
     CONTACT = "contact"
-    """It yields to a contact."""
+    """The arm yields to a contact."""
     HOLD = "hold"
-    """It brakes or stands, and `ControlStep.reason` says why."""
+    """The arm brakes or stands; `ControlStep.reason` names the cause."""
 
 
 @value
 class Limited:
-    """What keeps the arm from what is asked, and what is left of it."""
+    """The limit on the desired motion, and the share of the motion that remains."""
 
     by: Limit
     share: float
-    """Part of the end-effector's speed asked for that is left, along it: 1 all, 0 none or in contact and hold.
+    """Part of the desired end-effector speed that remains, along it: 1 all of it, 0 none, or a contact or hold.
 
-    By the measured velocity, with its noise; of an end-effector not asked to move the factor of eqs. 3 and 4."""
+    It follows from the measured velocity, with its noise; without a desired motion it is the factor of eqs. 3 and 4."""
     obstacle: int = -1
-    """Row of `ControlStep.obstacles` that limits; -1: none, or it has gone from view."""
+    """Index in `ControlStep.obstacles` of the limiting one; -1: none, or it is out of view."""
     unit: int = -1
-    """Index in the skin of the unit that sees it; from their number on an outside point, -1 as before."""
+    """Index in the skin of the unit that sees the obstacle; indices after those are outside points; -1: none."""
     link: int = -1
-    """Index of the link that is near it, or that is touched; -1 unknown."""
+    """Index of the link closest to the obstacle, or of the touched link; -1: unknown."""
     joint: int = -1
-    """Index of the joint at its limit; -1 of none."""
+    """Index of the joint at its limit; -1: none."""
 
 
 def limited_by(step: "ControlStep") -> Limited:
-    """Return what limits the motion of a step; a row that binds comes before eq. 3, and both before the joints."""
+    """Return the limit on the motion of a step; an active row comes before eq. 3, and both before the joints."""
     if step.mode is not Mode.TRACK:
         link = int(step.touched.link[0]) if len(step.touched.link) else -1
         return Limited(Limit.HOLD if step.mode is Mode.HOLD else Limit.CONTACT, 0.0, link=link)
@@ -78,7 +78,7 @@ def limited_by(step: "ControlStep") -> Limited:
     if len(rows):
         by, cause = Limit.APPROACH, int(rows[near.body_distance[rows].argmin()])
     elif step.speed_scale < FULL:
-        # what is known to move there slows nothing, and is infinitely far for eq. 3
+        # a moving fixture slows nothing: it is infinitely far for eq. 3
         slows = len(near.unit) > 0 and bool(np.isfinite(near.ee_distance.min()))
         by, cause = Limit.SLOWED, int(near.ee_distance.argmin()) if slows else -1
     share, speed = step.speed_scale, float(np.linalg.norm(step.desired_velocity))
@@ -89,19 +89,19 @@ def limited_by(step: "ControlStep") -> Limited:
 
 
 def binding(step: "ControlStep") -> BoolArray:
-    """Which of the restricted obstacles (K',) keep the arm from what it would do."""
+    """Flags (K',) of the restricted obstacles whose rows limit the motion."""
     count, qp = len(step.restricted), step.qp
     bound = np.zeros(count, dtype=np.bool_)
     if count and len(qp.slack) == count:
         bound = (qp.multipliers[-count:] > _PRESSED) | (qp.slack > 1e-6)
         if qp.violated and not bound.any():
-            # a row across a normal, which the solution leaves out: it is of what is nearest
+            # a row across a normal, which the solution omits: it belongs to the nearest obstacle
             bound[step.obstacles.body_distance[step.restricted].argmin()] = True
     return bound
 
 
 class Doing(Enum):
-    """What the arm does, in one word for somebody who sees it for the first time."""
+    """Motion of the arm in one word, for a first-time observer."""
 
     MOVING = "moving"
     SLOWED = "slowed"
@@ -113,12 +113,12 @@ class Doing(Enum):
     CAUGHT = "caught"
     WAITING = "waiting"
     STOPPED = "stopped"
-    """It holds until a person resumes."""
+    """The arm holds until a person resumes."""
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """What the arm does and why."""
+    """Motion of the arm and its cause."""
 
     doing: Doing
     sentence: str
@@ -130,13 +130,13 @@ def explain(
     links: Sequence[str],
     velocities: tuple[FloatArray, FloatArray] | None = None,
 ) -> Explanation:
-    """Say what the arm does in a step, who limits it, and how far.
+    """Explain the motion of a step, its limit, and how far that limits it.
 
     Args:
         step: of the controller.
         units: ids of the skin's units, in its order; () where the profile has no perception, as `blind`.
         links: names of the arm's links, in the order of the model.
-        velocities: of the end-effector's origin (3,) [m/s], base frame: what a commander asks, and what is commanded.
+        velocities: of the end-effector's origin (3,) [m/s], base frame: by the commander, and as commanded to the arm.
     """
     if step.mode is Mode.HOLD:
         explanation = Explanation(Doing.STOPPED if resumable(step) else Doing.WAITING, step.reason)
@@ -148,10 +148,10 @@ def explain(
 
 
 def _allowed(step: "ControlStep", links: Sequence[str], velocity: FloatArray, allowed: FloatArray) -> str:
-    """Say how much of a velocity is allowed, and what the sentence before does not say of who limits it."""
+    """Say how much of a velocity is allowed, and which limit the sentence before does not name."""
     speeds, limited, why = (float(np.linalg.norm(velocity)), float(np.linalg.norm(allowed))), step.limited, ""
     if max(speeds) < ASKED_M_S:
-        return "No motion is asked"
+        return "No motion is requested"
     if step.mode is Mode.TRACK and float(allowed @ velocity) < FULL * speeds[0] ** 2:
         if limited.link >= 0:
             why = f" near {links[limited.link]}"
@@ -159,11 +159,11 @@ def _allowed(step: "ControlStep", links: Sequence[str], velocity: FloatArray, al
             why = f": joint {limited.joint + 1} is at its limit"
         elif limited.by is Limit.NOTHING:  # as near a singularity: at the end of its reach
             why = ": this posture allows no more"
-    return f"Asked {speeds[0]:.2f} m/s, allowed {speeds[1]:.2f} m/s{why}"
+    return f"Requested {speeds[0]:.2f} m/s, allowed {speeds[1]:.2f} m/s{why}"
 
 
 def finds(step: "ControlStep") -> str:
-    """Say which push is found; '' where the detector does not say."""
+    """Say which push the detector finds; '' where it does not tell."""
     if np.isnan(step.detectable_n):
         return ""
     if step.detectable_n <= LOUD_N:
@@ -173,22 +173,22 @@ def finds(step: "ControlStep") -> str:
 
 
 def resumable(step: "ControlStep") -> bool:
-    """Whether a person can end the hold of a step: one that latches, or that waits to try a location again."""
+    """Return whether a person can end the hold of a step: it latches, or waits to try a location again."""
     return step.mode is Mode.HOLD and (step.latched or step.event is Event.GIVEN_UP)
 
 
 def still(step: "ControlStep") -> bool:
-    """Whether the arm is in contact and does not move."""
+    """Return whether the arm is in contact and does not move."""
     return step.mode is Mode.REACT and float(np.abs(step.command).max(initial=0.0)) < _REST_RAD_S
 
 
 def answers(step: "ControlStep") -> bool:
-    """Whether the arm moves with a contact."""
+    """Return whether the arm moves with a contact."""
     return not still(step) and float(np.linalg.norm(step.reaction_velocity)) >= _ANSWER_M_S
 
 
 def _sees(step: "ControlStep", units: Sequence[str], obstacle: int) -> str:
-    """Say who sees an obstacle, or that it is known, and how far from the arm."""
+    """Say which unit sees an obstacle, or that it is a moving fixture, and how far it is from the arm."""
     distance = max(0.0, float(step.obstacles.body_distance[obstacle]))
     if np.isinf(step.obstacles.ee_distance[obstacle]):
         return f"a fixture that moves is {distance:.2f} m away"
@@ -197,7 +197,7 @@ def _sees(step: "ControlStep", units: Sequence[str], obstacle: int) -> str:
 
 
 def _on_the_way(step: "ControlStep", units: Sequence[str], links: Sequence[str]) -> Explanation:
-    """Explain a step in which the arm does what is asked, as far as it can."""
+    """Explain a step in which the arm makes the desired motion, as far as it can."""
     limited = step.limited
     off = float(np.linalg.norm(step.ee_position - step.path_position))
     speed = float(np.linalg.norm(step.ee_velocity))
@@ -207,19 +207,19 @@ def _on_the_way(step: "ControlStep", units: Sequence[str], links: Sequence[str])
             return Explanation(Doing.RETURNING, f"Returning to its path, {off:.2f} m away.")
         near = step.obstacles.body_distance
         nothing = "nothing near is seen" if len(units) else "no sensor unit is in use"
-        seen = _sees(step, units, int(near.argmin())) if len(near) else nothing
+        nearest = _sees(step, units, int(near.argmin())) if len(near) else nothing
         moves = np.linalg.norm(step.desired_velocity) >= ASKED_M_S
-        return Explanation(Doing.MOVING, (f"Moving at {speed:.2f} m/s: " if moves else "In its place: ") + f"{seen}.")
+        return Explanation(Doing.MOVING, (f"Moving at {speed:.2f} m/s: " if moves else "In position: ") + f"{nearest}.")
     cause, share = limited.obstacle, limited.share if restricted else step.speed_scale
-    gone = "what was seen has gone from view, a unit is late, or none looks where it goes"
-    why = _sees(step, units, cause) if cause >= 0 else gone
+    no_cause = "an obstacle is out of view, a unit is late, or none covers the direction of motion"
+    why = _sees(step, units, cause) if cause >= 0 else no_cause
     if restricted and off >= OFF_PATH_M:
         place = f"{off:.2f} m from its path: {why}."
         if speed < _REST_M_S:
-            return Explanation(Doing.BLOCKED, f"At rest {place} It goes on when the way is clear.")
+            return Explanation(Doing.BLOCKED, f"At rest {place} It continues when the way is clear.")
         return Explanation(Doing.AVOIDING, f"Kept {place}")
     if speed < _REST_M_S and share < 0.1:
-        return Explanation(Doing.BLOCKED, f"At rest: {why}. It goes on when the way is clear.")
+        return Explanation(Doing.BLOCKED, f"At rest: {why}. It continues when the way is clear.")
     back = "" if off < OFF_PATH_M else f" on its way back to the path, {off:.2f} m away"
     if share < FULL:
         return Explanation(Doing.SLOWED, f"Slowed to {100 * share:.0f} %{back}: {why}.")
@@ -240,13 +240,13 @@ def _in_contact(step: "ControlStep", units: Sequence[str], links: Sequence[str])
         return Explanation(Doing.TOUCHED, f"{pushed}.")
     if not (len(step.touched.link) or step.evidence >= 1.0):
         if step.event is Event.REACTING:  # eq. 12 goes on whatever is measured
-            return Explanation(Doing.YIELDING, f"Moving the way it was pushed: {step.detail} left.")
-        then = f" The task goes on {step.detail}." if step.event is Event.YIELDING else ""
+            return Explanation(Doing.YIELDING, f"Moving in the direction of the push for another {step.detail}.")
+        then = f" The task continues {step.detail}." if step.event is Event.YIELDING else ""
         return Explanation(Doing.WAITING if still(step) else Doing.YIELDING, f"The push has ended.{then}")
     if not still(step):
         speed = float(np.linalg.norm(step.ee_velocity))
         return Explanation(Doing.YIELDING, f"{pushed}: moving with the push at {speed:.2f} m/s.")
     limiting = step.restricted[binding(step)]
     if len(limiting) and float(np.linalg.norm(step.reaction_velocity)) >= ASKED_M_S:
-        return Explanation(Doing.TOUCHED, f"{pushed}: held still, for {_sees(step, units, int(limiting[0]))}.")
+        return Explanation(Doing.TOUCHED, f"{pushed}: held still, because {_sees(step, units, int(limiting[0]))}.")
     return Explanation(Doing.TOUCHED, f"{pushed}: held still, the push is below what moves the arm.")

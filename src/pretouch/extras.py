@@ -1,4 +1,4 @@
-"""What is installed only where it is wanted: which modules an extra brings, and what to run where they are missing."""
+"""Optional dependencies: the modules of each extra, and the command that installs them."""
 
 import json
 import shlex
@@ -22,20 +22,20 @@ class Extra:
     """An extra of a distribution."""
 
     name: str
-    """'' is the distribution itself."""
+    """Name of the extra; '' for the distribution itself."""
     modules: tuple[str, ...]
-    """Modules that are imported where it is used."""
+    """Modules that code with this extra imports."""
     target: str
     """Target of make that installs it in a clone."""
     distribution: str = "pretouch"
 
     def missing(self, *modules: str) -> tuple[str, ...]:
-        """Return those of its modules that are not installed: of all, or of those that are named."""
+        """Return its modules that are not installed, of all or of those that are named."""
         return tuple(name for name in modules or self.modules if find_spec(name) is None)
 
     @property
     def command(self) -> str:
-        """What installs it where this Python is; see `install_command`."""
+        """Command that installs it for this Python; see `install_command`."""
         return install_command(self.distribution, self.name, self.target)
 
     def need(self, what: str, *modules: str) -> None:

@@ -1,4 +1,4 @@
-"""Which inputs to believe: faults of the inputs, distinguished before anything is computed from them."""
+"""Faults of the inputs, distinguished before anything is computed from the inputs."""
 
 from dataclasses import replace
 from typing import Annotated, NamedTuple
@@ -16,18 +16,18 @@ from pretouch.values import LARGEST, LATEST
 
 
 class Watched(NamedTuple):
-    """What is remembered to judge the next inputs."""
+    """Memory for the check of the next inputs."""
 
     stamp: Cell
     """Instant of the last step [s], always finite."""
     force_stamp: Cell
-    """When the robot last gave a force estimate [s]."""
+    """Instant of the last force estimate [s]."""
     robot: Report
-    """The last state that was believed."""
+    """The last plausible state."""
     sent: IntCell
-    """How many commands the last state may not know yet."""
+    """Number of commands that the last state may not contain yet."""
     sent_stamp: Annotated[FloatArray, "S"]
-    """(S,) when they were sent, oldest first [s]."""
+    """(S,) their instants, oldest first [s]."""
     sent_command: Annotated[FloatArray, "S", "n"]
     """(S, n) [rad/s]."""
 
@@ -41,17 +41,17 @@ def examine(
     params: FailureParams,
     torques: bool = False,
 ) -> tuple[RobotState, dict[Event, str]]:
-    """Return the robot state to go by, and the faults found; write what is to be remembered.
+    """Return the robot state to use, and the faults of the inputs; update the memory.
 
-    In place of a state that cannot be believed stands the last one that could, moved on by the last command. One from
-    before the last command, lost or late, is moved on by the commands it cannot know of: the next one may differ from
-    the last one sent by so much only. What is returned shares no memory with the inputs.
+    An implausible state is replaced by the last plausible one, advanced by the last command. A state from before the
+    last command, lost or late, is advanced by the commands that it cannot contain: the next command may differ from the
+    last one by so much only. The returned state shares no memory with the inputs.
 
     Args:
         watch: memory, written to.
         inputs: of this step.
         command: (n,) last joint velocity command [rad/s].
-        period: time that command was held [s].
+        period: time for which that command was held [s].
         qd_max: (n,) joint velocity limits [rad/s].
         params: time limits.
         torques: whether the torques of the external force are needed, rather than the force.
@@ -71,15 +71,13 @@ def examine(
         faults[Event.TIME_BACKWARDS] = f"from {before:.3f} s to {now:.3f} s"
         watch.sent[0] = 0
     if robot is None or faults:
-        last = robot_of(watch.robot)
-        robot = replace(
-            last, q_commanded=last.q_commanded + command * period, qd_commanded=command.copy(),
-            tau_ext=np.full(len(last.q), np.nan), wrench=None,
-        )  # fmt: skip
+        last, none = robot_of(watch.robot), np.full(len(qd_max), np.nan)
+        q = last.q_commanded + command * period
+        robot = replace(last, q_commanded=q, qd_commanded=command.copy(), tau_ext=none, wrench=None)
         watch.force_stamp[0] = min(watch.force_stamp[0], now)
     else:
         if robot.stamp <= before < now:
-            robot = replace(robot, q_commanded=_moved_on(robot, now, watch), qd_commanded=command.copy())
+            robot = replace(robot, q_commanded=_advanced(robot, now, watch), qd_commanded=command.copy())
         if robot.wrench is not None and not below(robot.wrench, params.force_max_n):
             robot = replace(robot, wrench=None)
         missing = not below(robot.tau_ext, STRONGEST) if torques else robot.wrench is None
@@ -94,32 +92,32 @@ def examine(
 
 
 def _stale(age: float) -> str:
-    """Say how old a state is [s], why that may be, and what to do."""
+    """Say how old a state is [s], the likely cause, and the remedy."""
     if age < 0:
-        return f"{-age:.3f} s in the future: let one clock stamp states and steps"
+        return f"{-age:.3f} s in the future: use one clock for states and steps"
     return (
-        f"{age:.3f} s old, for this machine is busy, perhaps without a real-time kernel, or the connection is slow:"
+        f"{age:.3f} s old, because this machine is busy, perhaps without a real-time kernel, or the connection is slow:"
         " close other programs and check the connection to the arm"
     )
 
 
-def _moved_on(robot: RobotState, now: float, watch: Watched) -> FloatArray:
-    """Commanded joint positions (n,) [rad] by now of an arm that was sent these commands after its report."""
+def _advanced(robot: RobotState, now: float, watch: Watched) -> FloatArray:
+    """Return the commanded joint positions (n,) [rad] of an arm at `now`, after the commands since its report."""
     q, count = robot.q_commanded, watch.sent[0]
     for i, (start, command) in enumerate(zip(watch.sent_stamp[:count], watch.sent_command[:count], strict=True)):
-        # what came before the first of them is not known, and taken to be the same
+        # the command before the first of them is unknown, and assumed to be the same
         begin = max(start, robot.stamp) if i else robot.stamp
-        lasted = (watch.sent_stamp[i + 1] if i + 1 < count else now) - begin
-        if lasted > 0:
-            q = q + command * lasted
+        duration = (watch.sent_stamp[i + 1] if i + 1 < count else now) - begin
+        if duration > 0:
+            q = q + command * duration
     return q
 
 
 def robot_of(report: Report) -> RobotState:
-    """Return the arm's state that a report in a record holds, as a copy."""
+    """Return the robot state of a report in a record, as a copy."""
     stamp, q, qd, q_commanded, qd_commanded, tau_ext, wrench = (part.copy() for part in report)
-    known = None if np.isnan(wrench[0]) else wrench
-    return RobotState(float(stamp[0]), q, qd, q_commanded, qd_commanded, tau_ext, known)
+    estimate = None if np.isnan(wrench[0]) else wrench
+    return RobotState(float(stamp[0]), q, qd, q_commanded, qd_commanded, tau_ext, estimate)
 
 
 def put_robot(report: Report, robot: RobotState) -> None:
@@ -131,7 +129,7 @@ def put_robot(report: Report, robot: RobotState) -> None:
 
 @compiled
 def add_sent(watch: Watched, command: FloatArray) -> None:
-    """Note that a command was sent at the last step; of more than there is room for the oldest is forgotten."""
+    """Note the command of the last step; where there is no room left, the oldest is dropped."""
     count = watch.sent[0]
     if count == len(watch.sent_stamp):
         watch.sent_stamp[:-1], watch.sent_command[:-1] = watch.sent_stamp[1:].copy(), watch.sent_command[1:].copy()
@@ -140,13 +138,13 @@ def add_sent(watch: Watched, command: FloatArray) -> None:
 
 
 def begin_watch(watch: Watched, robot: RobotState) -> None:
-    """Begin with a state of the arm that is known to be good."""
+    """Start the memory from a plausible state of the arm."""
     watch.stamp[0] = watch.force_stamp[0] = robot.stamp
     put_robot(watch.robot, robot)
 
 
 def take_sent(watch: Watched, other: Watched) -> None:
-    """Take the commands that another record says were sent, of those that there is no room for the newest."""
+    """Copy the sent commands of another record, as many of the newest as there is room for."""
     last = other.sent[0]
     count = watch.sent[0] = min(last, len(watch.sent_stamp))
     watch.sent_stamp[:count], watch.sent_command[:count] = (
@@ -155,10 +153,10 @@ def take_sent(watch: Watched, other: Watched) -> None:
 
 
 @kernel
-def believable(
+def is_plausible(
     now: float, robot: Report, watch: Watched, command: FloatArray, qd_max: FloatArray, p: FailureParams
 ) -> bool:
-    """Whether `examine` finds no fault and changes nothing but torques to NaN; then do what it does to the memory.
+    """Return whether `examine` would find no fault and change nothing; if so, update the memory as it does.
 
     `now` [s] is the instant of the step, `command` (n,) the last joint velocity command, `qd_max` (n,) its limits
     [rad/s].

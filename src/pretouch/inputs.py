@@ -1,4 +1,4 @@
-"""What a control step is given. All are set once, when they are made; arrays are read and not written to."""
+"""Inputs of a control step. Fields are set once, at construction; arrays are read and never written to."""
 
 import math
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class RangeStatus(IntEnum):
 
 @value
 class RangeReadings:
-    """The newest reading of each of K units, in the order of the skin; of one never heard -inf, and status NONE."""
+    """The newest reading of each of K units, in skin order; before its first: stamp -inf, status NONE."""
 
     stamp: Annotated[FloatArray, "K"]
     """(K,) instant of each measurement [s]."""
@@ -47,20 +47,20 @@ class RangeReadings:
 
 
 class TouchStatus(IntEnum):
-    """What a unit says of its touch sensor."""
+    """State of a unit's touch sensor."""
 
     OK = 0
     FAILED = 1
-    """It measures, and what it measures can be no reading: a broken lead."""
+    """The sensor answers with an impossible value: a broken lead."""
     NONE = 255
-    """It has none, or none was heard of."""
+    """The unit has no touch sensor, or has not reported yet."""
 
 
 @value
 class TouchReadings:
     """The newest touch reading of each of K sensor units, in the order of the skin.
 
-    A unit without a touch sensor, and one that has never been heard, has stamp -inf and status NONE.
+    A unit without a touch sensor, and one that has not reported yet, has stamp -inf and status NONE.
     """
 
     stamp: Annotated[FloatArray, "K"]
@@ -75,7 +75,7 @@ class TouchReadings:
 
 @value
 class RobotState:
-    """What the robot's own interface reports at one instant, n joints."""
+    """State of the robot at one instant, as its own interface reports it. n joints."""
 
     stamp: Annotated[float, LATEST]
     """Instant of the measurement [s]."""
@@ -97,13 +97,13 @@ class RobotState:
 
 
 class SeenPoints(NamedTuple):
-    """The newest M points of what outside sources see, such as cameras, in the base frame.
+    """The newest M points of outside sources such as cameras, in the base frame.
 
-    What a source shows of the arm itself or of fixtures may be in it. A row with a NaN shows nothing.
+    Points of the arm itself and of fixtures may be among them. A row with a NaN holds no point.
     """
 
     heard: float
-    """Newest measurement of the source silent for longest [s], -inf before the first; no points: nothing is seen."""
+    """Newest stamp [s] of the source that is silent for longest, -inf before the first. M = 0: nothing is near."""
     stamp: Annotated[FloatArray, "M"]
     """(M,) instant at which each point was measured [s]."""
     point: Annotated[FloatArray, "M", 3]
@@ -112,18 +112,18 @@ class SeenPoints(NamedTuple):
     """(M,) standard deviation of each point in the worst direction, that of the sensor's own pose included [m]."""
 
 
-_MOST_KG, _FARTHEST_M, _LONGEST_S = 100.0, 2.0, 10.0
-"""From here on a mass, a distance or a time is given in another unit."""
+_MOST = {"mass_kg": 100.0, "com_m": 2.0, "within_s": 10.0}
+"""Largest values of a payload; larger ones are taken for another unit."""
 
 
 @dataclass(frozen=True)
 class Payload:
-    """What the end-effector carries beyond what the arm's own controller knows.
+    """A load at the end-effector that the arm's own controller does not know.
 
-    What was set in a Franka by `setLoad` or in Desk is taken out of its external torques already: leave it out here.
+    A Franka's external torques are already without a load that was set by `setLoad` or in Desk: leave that out here.
 
-    Announce it as the gripper begins to close or open, not later: until `within_s` after that, any part of the change
-    passes for free motion. A wrong value is a ParameterError.
+    Announce a load when the gripper begins to close or open, not later: until `within_s` after that, any part of the
+    change counts as free motion. A wrong value is a ParameterError.
     """
 
     mass_kg: float
@@ -131,36 +131,33 @@ class Payload:
     com_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Its centre of mass in the frame of `RobotDescription.ee_body` [m]."""
     within_s: float = 0.5
-    """Longest time from the announcement until the arm carries it, or no longer carries it [s]: a gripper's way."""
+    """Longest time from the announcement until the load is on the arm, or off it [s]: the gripper's travel."""
 
     def __post_init__(self) -> None:
         try:
             x, y, z = map(real_number, self.com_m)
-            given = {
-                "mass_kg": (real_number(self.mass_kg), _MOST_KG), "com_m": (math.hypot(x, y, z), _FARTHEST_M),
-                "within_s": (real_number(self.within_s), _LONGEST_S),
-            }  # fmt: skip
+            mass, within = real_number(self.mass_kg), real_number(self.within_s)
         except (TypeError, ValueError) as error:
             raise ParameterError(f"{self!r} is no payload: give numbers, com_m three of them.") from error
-        for name, (number, most) in given.items():
+        for (name, most), number in zip(_MOST.items(), (mass, math.hypot(x, y, z), within), strict=True):
             if not 0.0 <= number <= most:
                 raise ParameterError(f"Payload.{name} is {getattr(self, name)}: give 0 to {most:g}, in SI units.")
         object.__setattr__(self, "com_m", (x, y, z))  # an array could not be compared
 
 
 _FAR = Below(100.0)
-"""Of a coordinate [m] or a speed [m/s] of a moving fixture."""
+"""Bound on coordinates [m] and speeds [m/s] of moving fixtures."""
 
 
 class MovingFixtures(NamedTuple):
-    """Bodies beside the arm that move and are known: C capsules in the arm's base frame.
+    """Bodies beside the arm whose motion is known, such as a second arm: C capsules in the arm's base frame.
 
-    What units see of them is no obstacle, while the arm keeps off them as off any: they are neither a person nor free
-    space.
+    A reading of them adds no obstacle. The arm keeps away from the capsules as from obstacles: they are neither a
+    person nor free space.
     """
 
     stamp: float
-    """Instant at which they were there [s]."""
+    """Instant of these positions [s]."""
     a: Annotated[FloatArray, "C", 3, _FAR]
     """(C, 3) one end of each axis [m]."""
     b: Annotated[FloatArray, "C", 3, _FAR]
@@ -179,12 +176,12 @@ class MovingFixtures(NamedTuple):
 
 
 SOMEWHERE = MovingFixtures(-np.inf, np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3)))
-"""Something that nobody has told of yet: the arm holds until then."""
+"""A moving fixture whose position has not been reported yet: the arm holds until it is."""
 
 
 @value
 class Inputs:
-    """All that one control step is given."""
+    """All inputs of one control step."""
 
     stamp: float
     """Instant of this step [s]."""
@@ -193,12 +190,12 @@ class Inputs:
     resume: bool = False
     """A person asks to leave a latched HOLD."""
     touch: TouchReadings | None = None
-    """What units say of being touched; None of a skin that has no touch sensors."""
+    """Readings of the units' touch sensors; None for a skin without any."""
     points: SeenPoints | None = None
-    """What outside sources see; None without one. Once given, silence of theirs stops the arm."""
+    """Points of outside sources; None without one. After the first points, silence of a source stops the arm."""
     payload: Payload | None = None
-    """What the arm carries; None: nothing is said, and what was said last stays."""
+    """Load that is announced; None: the last announcement stays."""
     desired: Desired | None = None
-    """What a commander asks for, in place of the path; None: the path is followed."""
+    """Motion that a commander requests in place of the path; None: the arm follows the path."""
     moving: MovingFixtures | None = None
-    """What is known to move beside the arm; None: nothing is said of any."""
+    """Bodies beside the arm whose motion is known; None without any."""

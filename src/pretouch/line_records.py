@@ -1,4 +1,4 @@
-"""What one control step works on: what is fixed, what is remembered, and what is new; see `line`."""
+"""Records of a control step: constants, memory, and the values of the step itself; see `line`."""
 
 from typing import Annotated, NamedTuple
 
@@ -8,27 +8,27 @@ from pretouch.contact.virtual_mass import VirtualMass
 from pretouch.contact.window import Window
 from pretouch.control.approach import MotionRequest
 from pretouch.control.braking import BrakingNumbers, Slots
-from pretouch.control.motion import Answer, MotionNumbers
-from pretouch.control.path import OnPath, Pace
+from pretouch.control.motion import MotionAnswer, MotionNumbers
+from pretouch.control.path import OnPath, PathPace
 from pretouch.faults import Watched
 from pretouch.params import FailureParams, RestrictionParams, ThresholdParams, WindowParams
 from pretouch.perception.external_points import OutsideState
 from pretouch.perception.obstacles import Sight, TrackState
-from pretouch.perception.perceive import Readings, Seen
+from pretouch.perception.perceive import PerceivedScene, Readings
 from pretouch.records import Cell
 from pretouch.robot.kinematics import Hinges, Kinematics, Mechanism
 from pretouch.types import FloatArray, Report
 
 PYTHON, THRESHOLDS, SEQUENTIAL = range(3)
-"""What detects a contact."""
+"""Kinds of contact detectors."""
 NO_ROWS, PAPER, BRAKING = range(1, 4)
-"""What restricts the body; PYTHON too."""
+"""Kinds of restrictions, beside PYTHON."""
 DECAY, ADMITTANCE = 1, 2
-"""What answers a contact; PYTHON too."""
+"""Kinds of reactions, beside PYTHON."""
 
 
 class Kinds(NamedTuple):
-    """Which parts of a profile are compiled."""
+    """Kinds of the parts of a profile; PYTHON is a part that is not compiled."""
 
     detect: int
     approach: int
@@ -36,7 +36,7 @@ class Kinds(NamedTuple):
 
 
 class Fixed(NamedTuple):
-    """What does not change from step to step."""
+    """Constants of all control steps."""
 
     kinds: Kinds
     hinges: Hinges
@@ -47,25 +47,25 @@ class Fixed(NamedTuple):
     sight: Sight
     window: WindowParams
     filtered: bool
-    """Whether the newest value of the window is held against the thresholds, and not the force itself."""
+    """True if the thresholds apply to the newest value of the window, not to the force itself."""
     thresholds: ThresholdParams
     test: SequentialNumbers
     no_gain: Annotated[FloatArray, "L"]
-    """(L,) factor 1 on the prior of a contact on each link: no unit says that it is touched."""
+    """(L,) factor 1 on the prior of a contact on each link, for steps in which no unit is touched."""
     notes_path: bool
-    """Whether the places are noted that the task goes through."""
+    """True if joint positions along the path are noted, so that the arm can open a pinch."""
     end_m: float
     """Length of an open path, infinite of a closed one [m]."""
     slow_m: float
     """Distance d_max of eq. 3, 0 where nothing slows the arm [m]."""
     paper: RestrictionParams
-    """Of eqs. 5-7, see `row_numbers`."""
+    """Numbers of eqs. 5-7, see `row_numbers`."""
     braking: BrakingNumbers
     motion: MotionNumbers
 
 
 class Remembered(NamedTuple):
-    """All that the compiled line remembers."""
+    """Memory of the compiled line."""
 
     watch: Watched
     tracks: TrackState
@@ -73,18 +73,18 @@ class Remembered(NamedTuple):
     window: Window
     test: SequentialState
     mass: VirtualMass
-    pace: Pace
+    pace: PathPace
     slots: Slots
     null_velocity: Annotated[FloatArray, "n"]
-    """(n,) joint velocity asked for in the null space [rad/s]."""
+    """(n,) desired joint velocity in the null space [rad/s]."""
     command: Annotated[FloatArray, "n"]
     """(n,) last joint velocity command [rad/s]."""
     rotation_goal: Annotated[FloatArray, 3, 3]
-    """(3, 3) R_O_ee at the start, held if the task asks for it."""
+    """(3, 3) R_O_ee at the start, which the task may hold."""
 
 
 class Now(NamedTuple):
-    """All that is new in a step."""
+    """Values of one step."""
 
     stamp: Cell
     robot: Report
@@ -92,11 +92,11 @@ class Now(NamedTuple):
     kin: Kinematics
     ee: Annotated[FloatArray, 3]
     """(3,) end-effector origin [m]."""
-    seen: Seen
+    scene: PerceivedScene
     filtered_force: Annotated[FloatArray, 3]
     """(3,) the newest value of the window [N]."""
     detection: SampleTest
-    """What the detector makes of it; of moving thresholds the bands are theirs, and the ratio is the force's part."""
+    """Result of the detector. Moving thresholds give their bands, and the force as a part of its band as the ratio."""
     path: OnPath
     request: MotionRequest
-    answer: Answer
+    answer: MotionAnswer

@@ -1,4 +1,4 @@
-"""What the compiled line is made with: the records of an arm, a skin, its surroundings, a path and a profile."""
+"""Records of the compiled line for an arm, a skin, its surroundings, a path and a profile."""
 
 import math
 import sys
@@ -14,14 +14,10 @@ from pretouch.contact.scatter import LENGTHS
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.virtual_mass import mass_init
 from pretouch.contact.window import window_init
-from pretouch.control.approach import (
-    ApproachRestriction,
-    BrakingCurve,
-    row_numbers,
-)
+from pretouch.control.approach import ApproachRestriction, BrakingCurve, row_numbers
 from pretouch.control.braking import braking_numbers, slots_init
 from pretouch.control.motion import MotionNumbers
-from pretouch.control.path import Pace
+from pretouch.control.path import PathPace
 from pretouch.faults import Watched
 from pretouch.line_records import (
     ADMITTANCE,
@@ -45,7 +41,7 @@ from pretouch.types import no_obstacles
 
 
 def kinds_of(profile: Any) -> Kinds:
-    """Return which parts of a profile are compiled; a part of one's own is not, also where it extends one that is."""
+    """Return the kinds of a profile's parts; a part of your own is not compiled, even if it extends one that is."""
     detect, approach, react = type(profile.detect), type(profile.approach), type(profile.react)
     return Kinds(
         THRESHOLDS if detect is MovingThresholds else SEQUENTIAL if detect is SequentialTest else PYTHON,
@@ -55,19 +51,21 @@ def kinds_of(profile: Any) -> Kinds:
 
 
 def fixed_of(controller: Any) -> Fixed:
-    """Return what does not change from step to step."""
+    """Return the constants of all control steps."""
     model, skin, profile, limits = controller.model, controller.skin, controller.profile, controller.limits
     kinds, n, t, see, failure = controller.kinds, model.n, profile.task, profile.perception, profile.failure
-    seen, thresholds = see or PerceptionParams(), MovingThresholds.of_kind(profile.detect)
+    perception, thresholds = see or PerceptionParams(), MovingThresholds.of_kind(profile.detect)
     # nothing is nearer than -inf, so nothing moves away
     away = profile.null_space or NullSpaceMotion().numbers._replace(distance_m=-math.inf)
     test = profile.detect if kinds.detect == SEQUENTIAL else SequentialParams()
     return Fixed(
         kinds, model.hinges, model.mechanism, limits.qd_max, failure,
         Sight(
-            see is not None and len(skin) > 0, seen.self_margin_m is not None, seen.self_margin_m or 0.0,
-            0.0 if seen.closing is None else seen.closing.memory_s, 0.0 if skin.exact else seen.spread_sigmas,
-            model.capsules, model.body, controller.fixtures.planes, skin.arrays, seen, seen.outside or OutsidePoints(),
+            see is not None and len(skin) > 0, perception.self_margin_m is not None, perception.self_margin_m or 0.0,
+            0.0 if perception.closing is None else perception.closing.memory_s,
+            0.0 if skin.exact else perception.spread_sigmas,
+            model.capsules, model.body, controller.fixtures.planes, skin.arrays, perception,
+            perception.outside or OutsidePoints(),
         ),
         profile.window, thresholds.compare == "filtered", thresholds,
         sequential_numbers(n, limits.period, test), np.ones(len(model.links)),
@@ -83,12 +81,12 @@ def fixed_of(controller: Any) -> Fixed:
 
 
 def _places(controller: Any) -> int:
-    """Count the obstacles there may be: of units, outside points, and links beside moving fixtures."""
+    """Return the largest number of obstacles: of units, outside points, and links beside moving fixtures."""
     return len(controller.skin) + controller.outside_places + len(controller.model.parts)
 
 
 def remembered_init(controller: Any) -> Remembered:
-    """Return what is remembered before the first step, but for what the arm reports and a detector knows already."""
+    """Return the memory before the first step, without the arm's first report and a detector's knowledge."""
     n, profile, period, kinds = controller.model.n, controller.profile, controller.limits.period, controller.kinds
     sent, none = int(profile.failure.state_timeout_s / period) + 2, np.zeros(n)
     zero, cycles = np.zeros(1), np.zeros(1, np.int64)
@@ -96,17 +94,17 @@ def remembered_init(controller: Any) -> Remembered:
         zeros(Watched, n=n, S=sent),
         track_init(len(controller.skin)), outside_init(controller.outside_places), window_init(profile.window.samples),
         sequential_init(n if kinds.detect == SEQUENTIAL else 0, SequentialParams()),
-        mass_init(n, Admittance.of_kind(profile.react)), Pace(np.ones(1), cycles, zero, zero),
+        mass_init(n, Admittance.of_kind(profile.react)), PathPace(np.ones(1), cycles, zero, zero),
         slots_init(_places(controller) if kinds.approach == BRAKING else 0), none, none, np.eye(3),
     )  # fmt: skip
 
 
 def now_init(controller: Any) -> Now:
-    """Return what a step begins with."""
+    """Return the values that each step starts from."""
     model, places = controller.model, _places(controller)
     now = zeros(Now, n=model.n, L=len(model.links), K=len(controller.skin), M=places, W=len(LENGTHS))
     return now._replace(
-        seen=now.seen._replace(near=no_obstacles(places), heard=np.ones(1)),
+        scene=now.scene._replace(near=no_obstacles(places), silence_scale=np.ones(1)),
         detection=now.detection._replace(detectable_n=np.full(1, np.nan)),
         request=now.request._replace(goal=np.eye(3), touch_m_s=np.full(1, np.nan), untouched=np.full(1, sys.maxsize)),
     )

@@ -1,4 +1,4 @@
-"""The only clock of the package, and the loop that turns the controller: read, step, command, record."""
+"""The only clock of the package, and the control loop: read, step, command, record."""
 
 import math
 import time
@@ -14,7 +14,7 @@ from pretouch.control.joint_box import JointLimits, joint_box
 from pretouch.controller import Controller, ControllerState
 from pretouch.desired import Desired
 from pretouch.errors import ParameterError
-from pretouch.ports import Clock, Points, Robot, Skin, touch_of
+from pretouch.ports import Clock, Points, Robot, SkinPort, touch_of
 from pretouch.signals import noted
 from pretouch.sound import time_of
 from pretouch.types import (
@@ -30,16 +30,15 @@ from pretouch.types import (
 from pretouch.values import real, value
 
 _FINEST = 1e-7
-"""Shortest time `Durations` tells apart [s]."""
+"""Resolution of `Durations` [s]."""
 _ROUNDING_RAD_S = 1e-6
-"""By how much the report of a command may be rounded [rad/s]."""
+"""Rounding of a reported command, at most [rad/s]."""
 _ENCODER_RAD = 0.02
-"""By how much a measured joint position may jump [rad]: what an encoder and a joint's elasticity can do."""
+"""Jump of a measured joint position, at most [rad]: by the encoder and the joint's elasticity."""
 _LAG_S = 0.025
-"""By how much an arm may lag behind the last command [s]: its way there, and a pause of the process that brings it."""
+"""Lag of an arm behind the last command, at most [s]: transport, and a pause of the process that sends it."""
 _WAIT_S = 0.5
-"""How long a busy machine may keep a loop waiting between its tick and what it reads [s]: beyond, a stamp of after the
-tick is another clock's."""
+"""Longest time from a tick until a busy machine reads the ports [s]: a later stamp belongs to another clock."""
 _BINS_PER_E = 1.0 / math.log(1.01)
 _BINS = 2316
 """Bins one per cent wide from a tenth of a microsecond to a thousand seconds."""
@@ -47,7 +46,7 @@ _BINS = 2316
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """How some durations are spread [s], each within half a per cent but the largest, which is exact."""
+    """Quantiles of some durations [s], each within half a per cent but the largest, which is exact."""
 
     median: float
     p99: float
@@ -56,16 +55,16 @@ class Spread:
 
 
 class Durations:
-    """Any number of durations in fixed memory: a loop may run for days."""
+    """Statistics of any number of durations in fixed memory: a loop may run for days."""
 
     def __init__(self) -> None:
         self._counts = [0] * _BINS
         self._largest = 0.0
         self.count = 0
-        """How many were added."""
+        """Number of durations."""
 
     def add(self, duration: float) -> None:
-        """Take one in [s]."""
+        """Add a duration [s]."""
         place = int(math.log(duration / _FINEST) * _BINS_PER_E) if duration > _FINEST else 0
         self._counts[min(place, _BINS - 1)] += 1
         self.count += 1
@@ -73,7 +72,7 @@ class Durations:
             self._largest = duration
 
     def spread(self) -> Spread:
-        """Median, 99 %, 99.9 % and the largest so far; zeros of none."""
+        """Return median, 99 %, 99.9 % and the largest so far; zeros without any."""
         below = np.cumsum(self._counts)
         places = np.searchsorted(below, np.array([0.5, 0.99, 0.999]) * self.count)
         middle = _FINEST * np.exp((places + 0.5) / _BINS_PER_E)
@@ -90,24 +89,24 @@ def spread_table(rows: dict[str, Spread]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """How a loop kept its time."""
+    """Timing of a loop."""
 
     period: float
-    """Period it was asked to keep [s]."""
+    """Nominal period [s]."""
     cycles: int
-    """Ticks given."""
+    """Number of ticks."""
     measured: Spread
     """Time from one tick to the next [s]."""
     wake_up: Spread
-    """How late the machine woke the loop for a tick it waited for [s]."""
+    """Delay of the wake-up for a tick [s]."""
     busy: Spread
-    """Time from a tick until the next one was asked for [s]."""
+    """Time from a tick until the request for the next one [s]."""
     cpu: Spread
     """Processor time of the loop's thread in that time [s]."""
     overruns: int
     """Cycles that were busy for longer than a period."""
     missed: int
-    """Ticks left out, because the loop was late by a period or more."""
+    """Ticks that were left out because the loop was late by a period or more."""
 
     def __str__(self) -> str:
         rows = {"period": self.measured, "late wake-up": self.wake_up, "busy": self.busy, "busy, CPU": self.cpu}
@@ -118,10 +117,10 @@ class Timing:
 
 
 class MonotonicClock:
-    """The machine's monotonic clock, ticking at a fixed period, and how well the caller kept up with it.
+    """The machine's monotonic clock with a fixed period, and the timing of its caller.
 
-    The first tick is at once, the others a whole number of periods after it. A late caller gets the next tick, not a
-    burst.
+    The first tick comes at once, the others a whole number of periods after it. A late caller gets the next tick, not
+    a burst.
     """
 
     def __init__(self, period: float) -> None:
@@ -130,11 +129,11 @@ class MonotonicClock:
             raise ParameterError(f"The period of the clock is {period} s: it must be greater than 0.")
         self.period = period
         self.missed = 0
-        """Ticks that went by unused because the caller was late."""
+        """Ticks that were left out because the caller was late."""
         self.overruns = 0
         """Cycles of the caller that took longer than a period."""
-        self._next = self._given = -math.inf
-        self._cpu_given = 0.0
+        self._next = self._ticked = -math.inf
+        self._cpu_ticked = 0.0
         self._cycles = 0
         self._measured, self._wake_up, self._busy, self._cpu = Durations(), Durations(), Durations(), Durations()
 
@@ -142,9 +141,9 @@ class MonotonicClock:
         """Wait for the next tick and return the time [s]."""
         now = time.monotonic()
         if self._cycles:
-            busy = now - self._given
+            busy = now - self._ticked
             self._busy.add(busy)
-            self._cpu.add(time.thread_time() - self._cpu_given)
+            self._cpu.add(time.thread_time() - self._cpu_ticked)
             self.overruns += busy > self.period
             late = int((now - self._next) / self.period)
             if late > 0:
@@ -157,14 +156,14 @@ class MonotonicClock:
             now = time.monotonic()
             self._wake_up.add(now - self._next)
         if self._cycles:
-            self._measured.add(now - self._given)
+            self._measured.add(now - self._ticked)
         self._next += self.period
         self._cycles += 1
-        self._given, self._cpu_given = now, time.thread_time()
+        self._ticked, self._cpu_ticked = now, time.thread_time()
         return now
 
     def timing(self) -> Timing:
-        """Report on all ticks so far; what the caller does since the last one is not in it."""
+        """Return the timing of all ticks so far, without the current cycle of the caller."""
         measured, wake_up = self._measured.spread(), self._wake_up.spread()
         busy, cpu = self._busy.spread(), self._cpu.spread()
         return Timing(self.period, self._cycles, measured, wake_up, busy, cpu, self.overruns, self.missed)
@@ -172,7 +171,7 @@ class MonotonicClock:
 
 @value
 class Cycle:
-    """One turn of the loop: `controller.step(before, inputs)` gives `step` and `after` again."""
+    """One cycle of the loop: `controller.step(before, inputs)` reproduces `step` and `after`."""
 
     inputs: Inputs
     before: ControllerState
@@ -181,40 +180,39 @@ class Cycle:
 
 
 class Recorder(Protocol):
-    """Something that keeps what the loop did."""
+    """Records the cycles of the loop."""
 
     def record(self, cycle: Cycle) -> None:
-        """Keep one turn of the loop."""
+        """Record one cycle of the loop."""
         ...
 
 
 @dataclass(frozen=True)
 class Options:
-    """What a loop can do without."""
+    """Optional inputs of a loop."""
 
     resume: Callable[[], bool] = lambda: False
-    """Whether a person now asks to leave a latched HOLD."""
+    """Returns whether a person now requests to leave a latched HOLD."""
     learnt: ResidualModel | None = None
-    """Free motion as an earlier session left it."""
+    """Model of free motion from an earlier session."""
     points: Points | None = None
-    """An outside source of points, read in the loop, so it must not wait; once there is one, its silence stops the
-    arm."""
+    """An outside source of points. The loop reads it, so it must not wait; its silence stops the arm."""
     payload: Callable[[], Payload | None] = lambda: None
-    """What the arm carries, asked in the loop; None: nothing is said, and what was said last stays."""
+    """Returns the load that is announced; None: the last announcement stays."""
     desired: Callable[[], Desired | None] = lambda: None
-    """What a commander asks for, asked in the loop: the newest again while there is no newer; None: the path."""
+    """Returns the newest motion that a commander requests, also more than once; None: the arm follows the path."""
     moving: Callable[[], MovingFixtures | None] = lambda: None
-    """What is known to move beside the arm, asked in the loop; None: nothing is said of any."""
+    """Returns the bodies beside the arm whose motion is known; None without any."""
 
 
 NO_OPTIONS = Options()
 
 
 def run(
-    controller: Controller, robot: Robot, skin: Skin, clock: Clock, recorder: Recorder,
+    controller: Controller, robot: Robot, skin: SkinPort, clock: Clock, recorder: Recorder,
     done: Callable[[ControlStep], bool], options: Options = NO_OPTIONS,
 ) -> None:  # fmt: skip
-    """Turn the controller until `done` says so of a step. However it ends, the arm is first brought to rest."""
+    """Run the control loop until `done` is true of a step. However it ends, the arm is first brought to rest."""
     state = controller.init(robot.read(), options.learnt)
     sent = state.memory.get("command")
     try:
@@ -231,31 +229,31 @@ def run(
 
 
 def turn(
-    controller: Controller, state: ControllerState, robot: Robot, skin: Skin, tick: float,
+    controller: Controller, state: ControllerState, robot: Robot, skin: SkinPort, tick: float,
     options: Options = NO_OPTIONS,
 ) -> Cycle:  # fmt: skip
-    """Turn the controller once, at a tick [s]: read, step, command."""
+    """Run one control cycle, at a tick [s]: read, step, command."""
     resume, payload, desired, points = options.resume(), options.payload(), options.desired(), options.points
     report, readings, touch = robot.read(), skin.read(), touch_of(skin)
-    seen = None if points is None else points.read()
+    outside = None if points is None else points.read()
     stamp = instant(tick, controller.limits.period, report, readings, touch)
-    believed = explained(controller, state, report, stamp)
-    inputs = Inputs(stamp, believed, readings, resume, touch, seen, payload, desired, options.moving())
+    state_of_arm = explained(controller, state, report, stamp)
+    inputs = Inputs(stamp, state_of_arm, readings, resume, touch, outside, payload, desired, options.moving())
     step, after = controller.step(state, inputs)
     robot.command(step.command)
     return Cycle(inputs, state, step, after)
 
 
 def explained(controller: Controller, state: ControllerState, robot: RobotState, now: float) -> RobotState:
-    """Return an arm's report with NaN for joints that no recent command, or no motion, explains; `now` is in s.
+    """Return an arm's report with NaN for joints that neither the recent commands nor any motion explain.
 
-    A loop that commands asks before each step: the next command may differ from the reported one by so much only, so a
-    false report would move the arm. An arm that gets no command holds its velocity or brakes, so a late step widens
-    what is explained towards rest only. A joint's velocity is explained between the least and the largest of the
-    commands that the report may be of, the last one braked for as long as the step is late, and one period of
-    acceleration beyond; its position by speed and acceleration limit since the last report. While a HOLD is latched a
-    person looks before the arm moves: whatever acceleration reaches since the last report is then explained. What is no
-    report of an arm stays as it is, for the step to name.
+    A loop calls this before each step, at `now` [s]: the next command may differ from the reported one by so much only,
+    so a false report would move the arm. An arm without a new command holds its velocity or brakes, so after a late
+    step a wider range of velocities is explained, but only towards rest. A velocity is explained from the least to the
+    largest of the commands that the report may contain, the last one braked for as long as the step is late, and by
+    one period of acceleration beyond; a position by speed and acceleration limit since the last report. During a
+    latched HOLD a person looks before the arm moves, so all that the acceleration limit allows since the last report is
+    explained. A value that is no report of an arm stays as it is: the step names the fault.
     """
     limits, memory = controller.limits, controller.with_places(state.memory)
     command, position, before = (memory.get(name) for name in ("command", "watch.robot.q", "watch.stamp"))
@@ -280,7 +278,7 @@ def explained(controller: Controller, state: ControllerState, robot: RobotState,
     braked = np.sign(command) * np.maximum(np.abs(command) - limits.qdd_max * late, 0.0)
     recent = np.array([command, braked, *memory.get("watch.sent_command")[: memory.get("watch.sent")]])
     explicable = (reported >= recent.min(axis=0) - reach) & (reported <= recent.max(axis=0) + reach)
-    if stamp > before:  # of after the last command, which it cannot lag behind by all of them
+    if stamp > before:  # from after the last command: the lag cannot cover all commands
         reach = reach + limits.qdd_max * _LAG_S
         explicable &= reported >= np.minimum(command, braked) - reach
         explicable &= reported <= np.maximum(command, braked) + reach
@@ -290,9 +288,9 @@ def explained(controller: Controller, state: ControllerState, robot: RobotState,
 def instant(
     tick: float, period: float, report: RobotState, readings: RangeReadings, touch: TouchReadings | None
 ) -> float:
-    """Instant of a step [s]: a port that stamps what it reads as it reads it is a little later than the tick.
+    """Return the instant of a step [s]: the newest of the tick and of the stamps that ports give when they are read.
 
-    The arm's report may be later than that: a busy machine may keep the loop waiting between the two.
+    The arm's report may be later than the others: a busy machine may stop the loop after the tick.
     """
     latest = tick
     for port, most in ((report, _WAIT_S), (readings, period), (touch, period)):
@@ -305,19 +303,19 @@ def instant(
 def come_to_rest(limits: JointLimits, robot: Robot, clock: Clock, q: FloatArray, qd: FloatArray) -> None:
     """Command the arm from its last command to rest, within its limits.
 
-    Where the arm is by then is reckoned from the commands: the robot's state may be what ended the loop. Ticks and
-    commands that fail do not end it: after a tick that failed the next command follows at once, and a command that
-    failed is given again, for up to twice the time that braking takes. Raises the first of their errors at the end,
-    whether the arm was brought to rest or not.
+    The commands give the arm's positions, for a fault of the robot's state may have ended the loop. Failing ticks and
+    commands do not end the braking: after a failed tick the next command follows at once, and a failed command is
+    repeated, for up to twice the time that braking takes. Raises the first of the errors at the end, whether the arm
+    was brought to rest or not.
 
     Args:
         limits: of the joints, with the period.
         robot: to command.
         clock: one tick for each command.
-        q: (n,) joint positions the motion generator was last known to be at [rad].
-        qd: (n,) joint velocities sent last [rad/s].
+        q: (n,) last reported joint positions of the motion generator [rad].
+        qd: (n,) last joint velocity command [rad/s].
     """
-    # each cycle takes one period's worth of acceleration from the joint that needs longest; one more for rounding
+    # each cycle slows the joint that needs longest by one period of acceleration; one cycle more for rounding
     longest = math.ceil(float((limits.qd_max / limits.qdd_max).max()) / limits.period) + 1
     errors: list[Exception] = []
     for _ in range(2 * longest):

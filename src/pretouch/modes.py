@@ -1,4 +1,4 @@
-"""What the arm is doing and why: one transition table, with a sentence for each reason; how a program ends."""
+"""Modes of the arm and their causes: one transition table with a sentence for each; outcomes of the QP."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from enum import Enum
 
 
 class Mode(Enum):
-    """What the arm is doing."""
+    """Behaviour of the arm."""
 
     TRACK = "track"
     """Follow the path, slowed and restricted near obstacles."""
@@ -17,7 +17,7 @@ class Mode(Enum):
 
 
 class Event(Enum):
-    """What can make the mode change, seen in one control step."""
+    """Causes of a change of the mode, as one control step detects them."""
 
     UNUSABLE = "unusable"
     TIME_BACKWARDS = "time_backwards"
@@ -54,129 +54,118 @@ class Transition:
     target: Mode
     sentence: str
     latches: bool = False
-    """Whether the HOLD lasts until a person resumes."""
+    """True if the HOLD lasts until a person resumes."""
     soft: bool = False
-    """Whether the arm may yield to a push while it holds: not where state, time or answer cannot be trusted."""
+    """True if the arm may yield to a push during the HOLD: not where state, time or solution cannot be trusted."""
 
 
-_ANY = frozenset(Mode)
+_ANY, _MOVES = frozenset(Mode), frozenset({Mode.REACT})
+
+
+def _latching(event: Event, sentence: str) -> Transition:
+    return Transition(event, _ANY, Mode.HOLD, sentence, latches=True)
+
+
+def _soft(event: Event, sentence: str) -> Transition:
+    return Transition(event, _ANY, Mode.HOLD, sentence, soft=True)
+
 
 TABLE: tuple[Transition, ...] = (
+    _latching(Event.UNUSABLE, "The robot's state cannot be used ({}): check the connection to the arm, then resume."),
+    _latching(Event.TIME_BACKWARDS, "Time went backwards ({}): use one monotonic clock for all stamps, then resume."),
+    _latching(Event.STATE_STALE, "The robot's state is {}, then resume."),
+    _latching(Event.SOLVER_FAILED, "The quadratic program was not solved ({}): look at the last steps, then resume."),
     Transition(
-        Event.UNUSABLE, _ANY, Mode.HOLD,
-        "The robot's state cannot be used ({}): check the connection to the arm, then resume.",
-        latches=True,
+        Event.BLOCKED,
+        frozenset({Mode.TRACK}),
+        Mode.HOLD,
+        "The approach limits cannot be met within the acceleration limits: the arm brakes and tries again.",
     ),
     Transition(
-        Event.TIME_BACKWARDS, _ANY, Mode.HOLD,
-        "Time went backwards ({}): let one monotonic clock stamp everything, then resume.", latches=True,
-    ),
-    Transition(
-        Event.STATE_STALE, _ANY, Mode.HOLD,
-        "The robot's state is {}, then resume.", latches=True,
-    ),
-    Transition(
-        Event.SOLVER_FAILED, _ANY, Mode.HOLD,
-        "The quadratic program gave no answer ({}): look at the last steps, then resume.", latches=True,
-    ),
-    Transition(
-        Event.BLOCKED, frozenset({Mode.TRACK}), Mode.HOLD,
-        "The approach limits cannot be met within the acceleration limits: braking and trying again.",
-    ),
-    Transition(
-        Event.BLOCKED, frozenset({Mode.REACT}), Mode.REACT,
+        Event.BLOCKED,
+        _MOVES,
+        Mode.REACT,
         "Moving with a contact, but the approach limits allow no motion within the acceleration limits: braking.",
     ),
     Transition(Event.LATCHED, frozenset({Mode.HOLD}), Mode.HOLD, "as before", latches=True),
     Transition(
-        Event.CONTACT, frozenset({Mode.TRACK, Mode.HOLD}), Mode.REACT,
-        "A contact of {}: yielding to what moves the arm.",
+        Event.CONTACT,
+        frozenset({Mode.TRACK, Mode.HOLD}),
+        Mode.REACT,
+        "A contact of {}: the arm yields to it.",
     ),
-    Transition(Event.REACTING, frozenset({Mode.REACT}), Mode.REACT, "Moving with a contact: {} left."),
+    Transition(Event.REACTING, _MOVES, Mode.REACT, "Moving with a contact for another {}."),
     Transition(
-        Event.CLAMPED, frozenset({Mode.REACT}), Mode.HOLD,
-        "The arm was clamped between two objects ({}) and has opened the way it came: free it, then resume.",
-        latches=True, soft=True,
-    ),
-    Transition(
-        Event.OPENING, frozenset({Mode.REACT}), Mode.REACT,
-        "Clamped between two objects ({}): opening the way it came.",
-    ),
-    Transition(
-        Event.YIELDING, frozenset({Mode.REACT}), Mode.REACT, "Yielding to a contact: the task goes on {}.",
-    ),
-    Transition(
-        Event.SKIN_UNFIT, _ANY, Mode.HOLD,
-        "The readings do not fit the skin ({}): give one of each unit, in the order of the skin.",
+        Event.CLAMPED,
+        _MOVES,
+        Mode.HOLD,
+        "The arm was clamped between two objects ({}) and has opened along its path: free it, then resume.",
+        latches=True,
         soft=True,
     ),
-    Transition(
-        Event.SKIN_SILENT, _ANY, Mode.HOLD,
-        "No usable reading from {}: check the unit's power, radio and sensor; the arm goes on when it is heard again.",
-        soft=True,
+    Transition(Event.OPENING, _MOVES, Mode.REACT, "Clamped between two objects ({}): opening along its path."),
+    Transition(Event.YIELDING, _MOVES, Mode.REACT, "Yielding to a contact: the task continues {}."),
+    _soft(
+        Event.SKIN_UNFIT, "The readings do not fit the skin ({}): give one reading per unit, in the order of the skin."
     ),
-    Transition(
-        Event.POINTS_LOST, _ANY, Mode.HOLD,
-        "The outside source of points {}: check it and its clock; the arm goes on when it is heard again.",
-        soft=True,
+    _soft(
+        Event.SKIN_SILENT,
+        "No usable reading from {}: check the unit's power, radio and sensor; the arm continues when it reports again.",
     ),
-    Transition(
-        Event.MOVING_LOST, _ANY, Mode.HOLD,
-        "The fixtures that move {}: check who tells of them; the arm goes on when it is told again.",
-        soft=True,
+    _soft(
+        Event.POINTS_LOST,
+        "The outside source of points {}: check it and its clock; the arm continues when it reports again.",
     ),
-    Transition(
-        Event.LOAD_UNFIT, _ANY, Mode.HOLD, "The announced payload is {}: announce what the arm carries.", soft=True,
-    ),
-    Transition(
-        Event.DESIRED_UNFIT, _ANY, Mode.HOLD,
-        "The desired motion cannot be used ({}): the arm goes on when it can.", soft=True,
-    ),
-    Transition(
-        Event.DESIRED_STALE, _ANY, Mode.HOLD,
-        "The desired motion ended {} ago: the arm goes on when a new one comes.", soft=True,
-    ),
-    Transition(
-        Event.NO_FORCE, _ANY, Mode.HOLD,
+    _soft(Event.MOVING_LOST, "The moving fixtures {}: check their source; the arm continues when it reports again."),
+    _soft(Event.LOAD_UNFIT, "The announced payload is {}: announce what the arm carries."),
+    _soft(Event.DESIRED_UNFIT, "The desired motion cannot be used ({}): the arm continues with a usable one."),
+    _soft(Event.DESIRED_STALE, "The desired motion ended {} ago: the arm continues with a new one."),
+    _soft(
+        Event.NO_FORCE,
         "The robot has given no force estimate for {}, as near a singularity, and contacts could not be detected:"
         " guide the arm to another posture.",
-        soft=True,
     ),
     Transition(
-        Event.OVERRUN, _ANY, Mode.HOLD,
-        "The step before this one was {} ago, for this machine is busy, perhaps without a real-time kernel: braking,"
-        " then going on. Close other programs, and give the controller a process of its own.",
+        Event.OVERRUN,
+        _ANY,
+        Mode.HOLD,
+        "The last step was {} ago, because this machine is busy, perhaps without a real-time kernel: the arm brakes,"
+        " then continues. Close other programs, and give the controller a process of its own.",
     ),
-    Transition(Event.GIVEN_UP, _ANY, Mode.HOLD, "Given up after {}.", soft=True),
+    _soft(Event.GIVEN_UP, "The arm gave up after {}."),
     Transition(
-        Event.PRESSED, frozenset({Mode.REACT, Mode.HOLD}), Mode.HOLD,
+        Event.PRESSED,
+        frozenset({Mode.REACT, Mode.HOLD}),
+        Mode.HOLD,
         "A force that does not move the arm has been detected for {}: free the arm, or, if nothing touches it, set the"
         " robot's load; the arm continues when the force is gone.",
         soft=True,
     ),
     Transition(
-        Event.WINDOW_FILLING, _ANY, Mode.HOLD,
+        Event.WINDOW_FILLING,
+        _ANY,
+        Mode.HOLD,
         "The force window is filling ({}): contacts cannot be distinguished from noise yet. The arm moves"
         " once it is full.",
     ),
-    Transition(Event.CLEAR, _ANY, Mode.TRACK, "Moving as asked."),
-)  # fmt: skip
-"""Read from the top: the first row whose event is present and whose source holds the mode is taken."""
+    Transition(Event.CLEAR, _ANY, Mode.TRACK, "Moving as requested."),
+)
+"""The first row applies whose event is present and whose source contains the mode."""
 
 
 @dataclass(frozen=True, slots=True)
 class ModeState:
-    """The mode, and why."""
+    """The mode, and its cause."""
 
     mode: Mode
     event: Event
-    """What made it so; of a HOLD that lasts, what began it."""
+    """Cause of the mode; of a HOLD that lasts, the event at its beginning."""
     detail: str = ""
-    """What the event's sentence says of this step."""
+    """Details of this step in the event's sentence."""
     reason: str = ""
     latched: bool = False
     soft: bool = False
-    """Whether the arm may yield to a push while it holds."""
+    """True if the arm may yield to a push during the HOLD."""
 
 
 CLEAR = ModeState(Mode.TRACK, Event.CLEAR, reason=TABLE[-1].sentence)
@@ -192,18 +181,18 @@ def next_mode(state: ModeState, events: Mapping[Event, str], resume: bool) -> Mo
 
     Args:
         state: the mode so far.
-        events: what this step saw, each with the detail its sentence needs.
-        resume: whether a person asks to leave a latched HOLD; a cause that is still there latches again.
+        events: of this step, each with the detail of its sentence.
+        resume: whether a person requests to leave a latched HOLD; a cause that persists latches again.
     """
     if not events and not state.latched:
         return CLEAR
-    seen = {**events, Event.CLEAR: ""}
+    present = {**events, Event.CLEAR: ""}
     if state.latched and not resume:
-        seen[Event.LATCHED] = ""
-    row = next(row for row in TABLE if row.event in seen and state.mode in row.source)
+        present[Event.LATCHED] = ""
+    row = next(row for row in TABLE if row.event in present and state.mode in row.source)
     if row.event is Event.LATCHED:
         return state
-    detail = seen[row.event]
+    detail = present[row.event]
     return ModeState(row.target, row.event, detail, row.sentence.format(detail), row.latches, row.soft)
 
 
@@ -229,7 +218,7 @@ ENDING = {
     BUDGET: "the iteration limit was reached",
     INFEASIBLE: "the approach rows cannot be met within the acceleration limits",
 }
-"""What happened, by how a minimisation ended, but for `SOLVED`."""
+"""Sentence part by ending of a minimisation, but for `SOLVED`."""
 
 
 def outcome_of(hold: bool, ending: int, violated: bool) -> tuple[QpOutcome, str, bool]:

@@ -1,4 +1,4 @@
-"""Parts that other distributions add by entry points: their names, and what they name, loaded when it is asked for."""
+"""Parts that other distributions add by entry points: their names, and their objects, loaded at the first use."""
 
 from functools import cache
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
@@ -18,7 +18,7 @@ def names(group: str) -> tuple[str, ...]:
 
 
 def load(group: str, name: str) -> object:
-    """Return what an entry point names.
+    """Return the object that an entry point names.
 
     Raises PluginError where there is none of this name, where two distributions have one, and where its module or what
     it should hold cannot be loaded.

@@ -1,4 +1,4 @@
-"""What the loop needs from the outside world, as one or two methods each."""
+"""Ports: interfaces of one or two methods between the loop and the arm, its units, other sensors and the clock."""
 
 from typing import Protocol
 
@@ -15,36 +15,36 @@ class Robot(Protocol):
         ...
 
     def command(self, qd: FloatArray) -> None:
-        """Take joint velocities (n,) [rad/s] as the set-point until the next command."""
+        """Set the joint velocities (n,) [rad/s] until the next command."""
         ...
 
 
 class Arm(Robot, Protocol):
-    """A robot that begins and ends to be moved. Its states are stamped by this machine's monotonic clock."""
+    """A robot whose motion is started and ended. Its states have stamps of this machine's monotonic clock."""
 
     @property
     def name(self) -> str:
-        """What sentences call it, as `Panda at 172.16.0.2`."""
+        """Name in sentences, as `Panda at 172.16.0.2`."""
         ...
 
     def unfit(self) -> tuple[str, ...]:
-        """Say what the arm itself has against being moved, a sentence each; none if it can be."""
+        """Return the arm's own reasons not to move, a sentence each; none if it can."""
         ...
 
     def begin(self) -> None:
-        """Take commands from here on, at rest. What forbids it is a RobotError."""
+        """Accept commands from now on, at rest. Raises RobotError where that is not possible."""
         ...
 
     def end(self) -> None:
-        """Come to rest, whatever was commanded, and take no more commands. Nothing happens where it has not begun."""
+        """Come to rest, whatever was commanded, and accept no more commands. Does nothing before `begin`."""
         ...
 
     def report(self) -> str:
-        """Say how the connection did, in lines; '' if there is nothing to say."""
+        """Return lines on the quality of the connection; '' for none."""
         ...
 
 
-class Skin(Protocol):
+class SkinPort(Protocol):
     """The sensor units on the arm."""
 
     def read(self) -> RangeReadings:
@@ -53,15 +53,15 @@ class Skin(Protocol):
 
 
 class NoUnits:
-    """The port `Skin` of an arm without units."""
+    """The port of an arm without units."""
 
     def read(self) -> RangeReadings:
-        """Return the readings of none."""
+        """Return no readings."""
         return RangeReadings(np.zeros(0), np.zeros(0), np.zeros(0, np.int64))
 
 
 def touch_of(skin: object) -> TouchReadings | None:
-    """Return the newest touch reading of each unit by the method `touch`; None while none is known."""
+    """Return the newest touch reading of each unit, by the method `touch` of a port; None before the first."""
     touch = getattr(skin, "touch", None)
     return None if touch is None else touch()
 
@@ -70,12 +70,12 @@ class Points(Protocol):
     """An outside source of points, such as a camera."""
 
     def read(self) -> SeenPoints:
-        """Return the newest set; the same one again, and at once, while there is no newer one."""
+        """Return the newest set at once; the same set again while there is no newer one."""
         ...
 
 
 class Clock(Protocol):
-    """The one clock all stamps come from."""
+    """The only clock: the source of all stamps."""
 
     def tick(self) -> float:
         """Wait for the next control period and return its instant [s]."""

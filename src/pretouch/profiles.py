@@ -1,4 +1,4 @@
-"""A profile is the choice of parts and parameters of a whole controller; the named ones, and how to make variants.
+"""Profiles: the named choices of parts and parameters of a whole controller, and how to make variants.
 
 `replace(profile, ...)` of the standard library makes a variant in a program, `profile("NAME:CHANGE:...")` from a text.
 """
@@ -45,15 +45,15 @@ class Profile(Checked):
     name: str = "paper"
     """Name shown in tables and files."""
     perception: PerceptionParams | None = field(default_factory=PerceptionParams)
-    """How readings become obstacle points (eq. 1); none: nothing is seen."""
+    """How readings become obstacle points (eq. 1); none: no obstacles."""
     task: TaskParams = field(default_factory=TaskParams)
     """How the hand follows its path (eq. 2)."""
     slow: SpeedReduction | None = field(default_factory=SpeedReduction)
-    """What slows the arm near obstacles (eq. 3); none: nothing but silent units does."""
+    """Reduction of the speed near obstacles (eq. 3); none: only silent units slow the arm."""
     approach: Restriction | None = field(default_factory=ApproachRestriction)
-    """What keeps the body from what is near (eqs. 5-7, or other rows of the QP); none: nothing does."""
+    """Restriction of the body's approach to obstacles (eqs. 5-7, or other rows of the QP); none: no restriction."""
     null_space: NullSpaceMotion | None = None
-    """Whether links before the hand move away from what is near in the null space of the task."""
+    """Motion of links before the hand away from obstacles, in the null space of the task; none: no such motion."""
     window: WindowParams = field(default_factory=WindowParams)
     """The window of the external force: contacts are detected once it is full (eq. 8)."""
     detect: Detector = field(default_factory=MovingThresholds)
@@ -65,18 +65,18 @@ class Profile(Checked):
 
     @property
     def sight(self) -> PerceptionParams:
-        """Parameters of perception; the paper's where there is none, for pages that show units all the same."""
+        """Parameters of perception; the paper's for a profile without perception, for pages that show the units."""
         return self.perception or PerceptionParams()
 
     @property
     def outside_per_link(self) -> int:
-        """How many points of outside sources are kept for each link; 0: such points are not used."""
+        """Number of outside points for each link; 0: outside points are not used."""
         outside = None if self.perception is None else self.perception.outside
         return 0 if outside is None else outside.per_link
 
     @property
     def d_max_m(self) -> float:
-        """Distance from the end-effector origin within which something is near it [m]: of eq. 3, or Table I's."""
+        """Distance from the end-effector origin within which an obstacle is near it [m]: of eq. 3, or Table I's."""
         return (self.slow or SpeedReduction()).d_max_m
 
 
@@ -128,7 +128,7 @@ SHORT = {
     ":approach.tangential.speed_m_s=0.04",
 }
 """Short names of variants: `paper-off` of tables of results, `pretouch-zones` for skins of sensors with zones, which
-are noisier, see what the arm meets early and lose it, and put it up to half a zone aside (docs/results/skins.md)."""
+are noisier, see obstacles early and lose them again, and place them up to half a zone aside (docs/results/skins.md)."""
 
 
 def profile_names() -> tuple[str, ...]:
@@ -140,8 +140,8 @@ def profile(text: str) -> Profile:
     """Look a profile up: by its name, or as `NAME:CHANGE:...`, that profile with some parts or parameters changed.
 
     A change is a part by its name or a parameter by its value, as `paper:detect=sequential:task.speed_m_s=0.2`, and
-    `none` leaves a part out. Raises ParameterError for a profile, part or parameter there is not, naming those there
-    are, and for a value that is not allowed.
+    `none` leaves a part out. Raises ParameterError for an unknown profile, part or parameter, with a list of the known
+    ones, and for a value that is not allowed.
     """
     base, *changes = text.split(":")
     return replace(changed(_named(base), _paths(changes)), name=text) if changes else _named(base)
@@ -174,9 +174,9 @@ def _paths(changes: list[str]) -> dict[str, str]:
 
 
 def at_rate(profile: Profile, rate: float) -> Profile:
-    """Return a profile for a controller at another rate [Hz]: what it counts in cycles lasts as long as before.
+    """Return a profile for a controller at another rate [Hz]: times that it counts in cycles stay the same.
 
-    That is the fading of eq. 4, the force window, and the decay of a reaction; alpha of eq. 8, the weight of one
+    These are the fading of eq. 4, the force window, and the decay of a reaction; alpha of eq. 8, the weight of one
     sample, changes so that a lasting push enters the window as fast as before.
     """
     p, more = profile, rate * profile.task.control_period_s
@@ -184,11 +184,8 @@ def at_rate(profile: Profile, rate: float) -> Profile:
         least = 1 / p.failure.overrun_s
         raise ParameterError(f"The rate is {rate:g} Hz: it must be more than {least:g} Hz, or each step would be late.")
     samples, alpha = max(2, round(p.window.samples * more)), 1 - (1 - p.window.alpha) ** (1 / more)
-    return p if more == 1 else replace(
-        p,
-        task=replace(
-            p.task, control_period_s=1 / rate, restore_cycles=max(1, round(p.task.restore_cycles * more))
-        ),
-        window=replace(p.window, samples=samples, alpha=alpha),
-        react=p.react.stretched(more),
-    )  # fmt: skip
+    if more == 1:
+        return p
+    task = replace(p.task, control_period_s=1 / rate, restore_cycles=max(1, round(p.task.restore_cycles * more)))
+    window = replace(p.window, samples=samples, alpha=alpha)
+    return replace(p, task=task, window=window, react=p.react.stretched(more))

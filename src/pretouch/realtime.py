@@ -1,4 +1,4 @@
-"""Running the loop at 1 kHz on Linux: everything compiled first, no garbage collection, priority, and a processor."""
+"""The loop at 1 kHz on Linux: compiled before the start, without garbage collection, with priority and a processor."""
 
 import ctypes
 import gc
@@ -15,54 +15,54 @@ from pretouch import loop
 from pretouch.controller import Controller
 from pretouch.desired import joint_positions
 from pretouch.errors import ParameterError
-from pretouch.ports import Robot, Skin
+from pretouch.ports import Robot, SkinPort
 from pretouch.signals import ended_in_order
 from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RangeStatus, RobotState, SeenPoints
 
 _PR_SET_TIMERSLACK, _PR_GET_TIMERSLACK = 29, 30
-"""Of Linux' `prctl`."""
+"""Options of Linux' `prctl`."""
 
 _WARM_UP_STEPS = 3
-"""Steps of each kind: what one sees for the first time the next one remembers."""
+"""Steps of each kind: the first one changes the memory that the next one uses."""
 _PUSH_NM = 50.0
-"""External torque of each joint in a contact that is made up [Nm]."""
+"""External torque of each joint in the rehearsed contact [Nm]."""
 _NEWS_S = 0.5
-"""Longest time the first state is waited for [s]: then the controller says how old the newest is."""
+"""Longest wait for a new state [s]; after it the controller reports the age of the newest one."""
 _LOOK_S = 0.001
-"""Between two looks at whether a state has come [s]."""
+"""Period of the checks for a new state [s]."""
 
 
 @dataclass(frozen=True)
-class Options(loop.Options):
-    """What a loop in real time can do without."""
+class RealTimeOptions(loop.Options):
+    """Optional inputs and settings of a loop in real time."""
 
     priority: int | None = None
     """See `real_time`."""
     cpu: int | None = None
     """See `real_time`."""
     tell: Callable[[str], None] = print
-    """Is given each sentence on what could not be had, before the loop begins."""
+    """Receives a sentence for each setting that the machine refuses, before the loop begins."""
 
 
-NO_OPTIONS = Options()
+NO_OPTIONS = RealTimeOptions()
 
 
 def run(
-    controller: Controller, robot: Robot, skin: Skin, clock: loop.MonotonicClock, recorder: loop.Recorder,
-    done: Callable[[ControlStep], bool], options: Options = NO_OPTIONS,
+    controller: Controller, robot: Robot, skin: SkinPort, clock: loop.MonotonicClock, recorder: loop.Recorder,
+    done: Callable[[ControlStep], bool], options: RealTimeOptions = NO_OPTIONS,
 ) -> None:  # fmt: skip
-    """`loop.run`, warmed up and in a process prepared for real time. However it ends, `clock.timing()` is the report.
+    """Run `loop.run`, warmed up and in a process prepared for real time; `clock.timing()` is the report.
 
-    SIGTERM and SIGHUP, where nobody else handles them, end it like Ctrl-C: the arm comes to rest first.
+    SIGTERM and SIGHUP, without another handler, end it like Ctrl-C: the arm comes to rest first.
 
     Args:
         controller: its period must be the clock's.
         robot: the arm.
         skin: its sensor units.
-        clock: gives the ticks and measures how they are kept.
-        recorder: keeps the steps; it runs in the loop, so it must not wait for a disk.
+        clock: gives the ticks and measures the timing.
+        recorder: records the cycles; it runs in the loop, so it must not wait for a disk.
         done: whether a step was the last.
-        options: what it can do without.
+        options: optional inputs and settings.
     """
     if not math.isclose(clock.period, controller.limits.period, rel_tol=1e-9):
         raise ParameterError(
@@ -78,10 +78,10 @@ def run(
 
 
 def _await_news(robot: Robot) -> None:
-    """Wait for a state measured from now on.
+    """Wait for a state that is measured from now on.
 
-    Preparing keeps the interpreter from other threads, as from one that receives the arm's states: with the newest that
-    it left, the first step would find the arm silent.
+    The preparation blocks other threads, as one that receives the arm's states: with the newest state from before, the
+    first step would find the arm silent.
     """
     looks = loop.MonotonicClock(_LOOK_S)
     now = begun = looks.tick()
@@ -91,17 +91,17 @@ def _await_news(robot: Robot) -> None:
 
 @contextmanager
 def real_time(priority: int | None = None, cpu: int | None = None) -> Iterator[tuple[str, ...]]:
-    """Prepare this process for a loop in real time, and undo it all afterwards.
+    """Prepare this process for a loop in real time, and undo that afterwards.
 
-    The garbage collector is off, and what is there already is frozen: a full collection stops a loop for a tenth of a
-    second. Timers of this thread wake without slack. What the machine refuses is left out.
+    The garbage collector is off, and the objects that exist are frozen: a full collection stops a loop for a tenth of a
+    second. Timers of this thread wake without slack. Settings that the machine refuses are left out.
 
     Args:
         priority: of the thread in the scheduling class SCHED_FIFO, 1 to 99; None leaves the class as it is.
         cpu: number of the processor to stay on; None leaves that to the system.
 
     Yields:
-        A sentence for each thing that could not be had.
+        A sentence for each setting that the machine refuses.
     """
     check_wishes(priority, cpu)
     with ExitStack() as undo:
@@ -114,7 +114,7 @@ def real_time(priority: int | None = None, cpu: int | None = None) -> Iterator[t
 
 
 def check_wishes(priority: int | None, cpu: int | None) -> None:
-    """Raise ParameterError for a priority or processor there is not, naming those there are."""
+    """Raise ParameterError, with the choices, for a priority or processor that does not exist."""
     if sys.platform != "linux":
         return
     low, high = os.sched_get_priority_min(os.SCHED_FIFO), os.sched_get_priority_max(os.SCHED_FIFO)
@@ -123,7 +123,7 @@ def check_wishes(priority: int | None, cpu: int | None) -> None:
     allowed = sorted(os.sched_getaffinity(0))
     if cpu is not None and cpu not in allowed:
         raise ParameterError(
-            f"Processor {cpu} is none this process may use: choose from {', '.join(map(str, allowed))}."
+            f"Processor {cpu} is not available to this process: choose from {', '.join(map(str, allowed))}."
         )
 
 
@@ -136,14 +136,14 @@ def _no_collections() -> Iterator[None]:
     try:
         yield
     finally:
-        if froze:  # what somebody else froze stays so
+        if froze:  # objects frozen by other code stay so
             gc.unfreeze()
         if was_on:
             gc.enable()
 
 
 def _sharpen_timers(undo: ExitStack) -> None:
-    """Take away the 50 us by which Linux lets the timers of ordinary threads be late."""
+    """Remove the 50 us of slack that Linux gives the timers of ordinary threads."""
     prctl = getattr(ctypes.CDLL(None), "prctl", None)
     if prctl is None:
         return
@@ -166,7 +166,7 @@ def _go_first(priority: int | None, undo: ExitStack) -> str:
             " CAP_SYS_NICE."
         )
     except OSError as error:
-        return f"Real-time priority {priority} is not to be had here ({error.strerror}): the loop runs without it."
+        return f"Real-time priority {priority} is not available here ({error.strerror}): the loop runs without it."
     undo.callback(os.sched_setscheduler, 0, policy, param)
     return ""
 
@@ -179,59 +179,59 @@ def _stay(cpu: int | None, undo: ExitStack) -> str:
         os.sched_setaffinity(0, {cpu})
     except OSError as error:
         return (
-            f"Staying on processor {cpu} was refused ({error.strerror}), so the loop may move: let the container or"
-            " cpuset of this process have it."
+            f"Staying on processor {cpu} was refused ({error.strerror}), so the loop may move: add it to the container"
+            " or cpuset of this process."
         )
     undo.callback(os.sched_setaffinity, 0, before)
     return ""
 
 
 def warm_up(controller: Controller, robot: RobotState, points: bool = False) -> None:
-    """Run steps whose results are dropped, so that nothing is left to be compiled or loaded in the loop.
+    """Run steps without using their results, so that nothing is compiled or loaded in the loop.
 
-    They see obstacles and none, follow the path and a commander, meet a contact and a robot that cannot be believed:
-    TRACK, REACT and HOLD. The controller and its arm are left as they are.
+    The steps have obstacles and none, follow the path and a commander, detect a contact and an implausible robot state:
+    TRACK, REACT and HOLD. The controller and its arm do not change.
 
     Args:
-        controller: the one that the loop will turn.
-        robot: a state of the arm, as its interface gives it.
-        points: whether there will be an outside source of points.
+        controller: of the loop.
+        robot: a state of the arm, from its interface.
+        points: whether the loop has an outside source of points.
     """
     quiet, push = np.zeros(6), np.array([0.9 * controller.profile.failure.force_max_n, 0, 0, 0, 0, 0])
     lost = np.full(len(robot.q), np.nan)
-    for seen in (RangeStatus.SIGNAL, RangeStatus.OK):
+    for status in (RangeStatus.SIGNAL, RangeStatus.OK):
         rehearsal = _Rehearsal(controller, robot, points)
         for _ in range(controller.profile.window.samples):
             rehearsal.step(None, quiet)
         for wrench in (robot.wrench, None, quiet, push):
             for _ in range(_WARM_UP_STEPS):
-                rehearsal.step(seen, wrench, _PUSH_NM if wrench is push else 0.0)
+                rehearsal.step(status, wrench, _PUSH_NM if wrench is push else 0.0)
         for _ in range(_WARM_UP_STEPS):
-            rehearsal.step(seen, quiet, asks=True)
-        # a loss that latches, and the way out of it
-        rehearsal.step(seen, quiet, q=lost)
-        rehearsal.step(seen, quiet, resume=True)
+            rehearsal.step(status, quiet, commanded=True)
+        # a fault that latches, and the resume after it
+        rehearsal.step(status, quiet, q=lost)
+        rehearsal.step(status, quiet, resume=True)
 
 
 class _Rehearsal:
-    """A controller that is given made-up inputs, one period after another."""
+    """Runs a controller with artificial inputs, one period after another."""
 
     def __init__(self, controller: Controller, robot: RobotState, points: bool) -> None:
         self._controller, self._robot, self._now, self._points = controller, robot, robot.stamp, points
         self._state = controller.init(robot)
 
     def step(
-        self, seen: RangeStatus | None, wrench: FloatArray | None, torque: float = 0.0, q: FloatArray | None = None,
-        resume: bool = False, asks: bool = False,
+        self, range_status: RangeStatus | None, wrench: FloatArray | None, torque: float = 0.0,
+        q: FloatArray | None = None, resume: bool = False, commanded: bool = False,
     ) -> None:  # fmt: skip
-        """Turn the controller once. All units say `seen`, at distances up to 1 m; without it they say nothing.
+        """Run one step. All units report this status, at distances up to 1 m; None stands for no report.
 
-        `torque` of each joint is added to what the arm reports [Nm]: a detector may go by torques alone.
+        `torque` is added to the reported torque of each joint [Nm]: a detector may use torques alone.
         """
         self._now += self._controller.limits.period
         units = len(self._controller.skin)
-        stamp = np.full(units, -np.inf if seen is None else self._now)
-        status = np.full(units, int(RangeStatus.NONE if seen is None else seen))
+        stamp = np.full(units, -np.inf if range_status is None else self._now)
+        status = np.full(units, int(RangeStatus.NONE if range_status is None else range_status))
         robot = replace(self._robot, stamp=self._now, wrench=wrench, q=self._robot.q if q is None else q)
         if torque and robot.tau_ext is not None:
             robot = replace(robot, tau_ext=robot.tau_ext + torque)
@@ -239,8 +239,8 @@ class _Rehearsal:
         points = None
         if self._points:
             near = self._controller.model.kinematics(self._robot.q).position + np.array([0.0, 0.3, 0.1])
-            count = len(near) if seen is RangeStatus.OK else 0
+            count = len(near) if range_status is RangeStatus.OK else 0
             points = SeenPoints(self._now, np.full(count, self._now), near[:count], np.full(count, 0.01))
-        stays = joint_positions(self._now, robot.q) if asks else None
+        stays = joint_positions(self._now, robot.q) if commanded else None
         inputs = Inputs(self._now, robot, readings, resume, points=points, desired=stays)
         _, self._state = self._controller.step(self._state, inputs)

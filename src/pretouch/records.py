@@ -24,7 +24,7 @@ Cell = Annotated[FloatArray, 1]
 IntCell = Annotated[IntArray, 1]
 """One whole number of a record that compiled code writes to."""
 BLOCK_TYPES = (np.float64, np.int64, np.bool_)
-"""Of a record's numbers."""
+"""Number types of a record's blocks."""
 _KINDS = {FloatArray: 0, IntArray: 1, BoolArray: 2, float: 0, int: 1, bool: 2}
 """Block of a field, by its annotation."""
 
@@ -33,8 +33,8 @@ Blocks = tuple[FloatArray, IntArray, BoolArray, IntArray]
 """The numbers of a record, of float64, int64 and bool, and where each field starts, and its shape."""
 
 
-class Place(NamedTuple):
-    """Where a field lies."""
+class FieldPlace(NamedTuple):
+    """Place of a field in the blocks of a record."""
 
     kind: int
     """Index of its block."""
@@ -42,7 +42,7 @@ class Place(NamedTuple):
     shape: tuple[int, ...]
     """() of a number that compiled code only reads."""
     single: bool
-    """Whether it is one number, whatever the sizes of this record are."""
+    """True of a field that is one number, whatever the sizes of the record."""
 
 
 @cache
@@ -54,32 +54,32 @@ def _hints(record: type) -> dict[str, Any]:
 
 @cache
 def _fields_at(path: str, record: type) -> list[tuple[str, str, type | None]]:
-    """Return of each field of a record at a path its name, its own path, and its class if it is a record."""
+    """Return name, path and class (None unless a record) of each field of a record at a path."""
     return [(name, f"{path}.{name}", hint if _hints(hint) else None) for name, hint in _hints(record).items()]
 
 
-class _Part(NamedTuple):
-    """A record with its fields, or a field, and where the table says where it lies."""
+class _RecordNode(NamedTuple):
+    """A record with its fields, or a field with its entry in the table of places."""
 
     kind: type
-    fields: "Mapping[str, _Part]"
+    fields: "Mapping[str, _RecordNode]"
     block: int = 0
     entry: int = 0
     dimensions: tuple[str | int, ...] = ()
 
 
-def _tree(kind: Any, entries: list[int]) -> _Part:
-    """Return a record or field with all in it; `entries` holds how many of the table's numbers are of those before."""
+def _tree(kind: Any, entries: list[int]) -> _RecordNode:
+    """Return the tree of a record or field; `entries` counts the table's numbers of the fields before."""
     if hints := _hints(kind):
         fields = {name: _tree(hint, entries) for name, hint in hints.items()}
-        return _Part(getattr(kind, "Numbers", kind), fields)
+        return _RecordNode(getattr(kind, "Numbers", kind), fields)
     array, *dimensions = get_args(kind) if get_origin(kind) is Annotated else (kind,)
     entry = entries[0]
     entries[0] += 1 + len(dimensions)
-    return _Part(array, {}, _KINDS[array], entry, tuple(dimensions))
+    return _RecordNode(array, {}, _KINDS[array], entry, tuple(dimensions))
 
 
-def _leaves(part: _Part, path: str = "") -> Iterator[tuple[str, _Part]]:
+def _leaves(part: _RecordNode, path: str = "") -> Iterator[tuple[str, _RecordNode]]:
     """Yield the fields of a record and of those in it, with their paths."""
     for name, inner in part.fields.items():
         if inner.fields:
@@ -93,23 +93,23 @@ class Flat:
 
     __slots__ = ("blocks", "places")
 
-    def __init__(self, blocks: Blocks, places: Mapping[str, Place] | None = None) -> None:
-        """Take the blocks, and where their fields lie; a recording does not say that."""
+    def __init__(self, blocks: Blocks, places: Mapping[str, FieldPlace] | None = None) -> None:
+        """Take the blocks, and the places of their fields, which a recording does not store."""
         self.blocks, self.places = blocks, places or {}
 
     @classmethod
     def of(cls, record: Any) -> "Flat":
-        """Lay out a record; a dimension has one size in all fields of the record that names it, else: ValueError."""
-        places, sizes, table, known = dict[str, Place](), [0, 0, 0], list[int](), dict[tuple[str, str], int]()
+        """Lay out a record; a dimension has one size in all fields of a record, otherwise this is a ValueError."""
+        places, sizes, table, extents = dict[str, FieldPlace](), [0, 0, 0], list[int](), dict[tuple[str, str], int]()
         for path, (_, _, kind, _, dimensions) in _leaves(_tree(type(record), [0])):
             shape, owner = np.shape(attrgetter(path)(record)), path.rpartition(".")[0]
             named = zip(dimensions, shape, strict=False)
-            sized = tuple(known.setdefault((owner, d), s) if isinstance(d, str) else d for d, s in named)
+            sized = tuple(extents.setdefault((owner, d), s) if isinstance(d, str) else d for d, s in named)
             if sized != shape or len(dimensions) != len(shape):
                 raise ValueError(f"{path} has the shape {shape}, where {dimensions} are {sized}")
             start = sizes[kind]
             sizes[kind] += int(np.prod(shape, dtype=int))
-            places[path] = Place(kind, slice(start, sizes[kind]), shape, dimensions in ((), (1,)))
+            places[path] = FieldPlace(kind, slice(start, sizes[kind]), shape, dimensions in ((), (1,)))
             table += [start, *shape]
         blocks: Any = (*map(np.empty, sizes, BLOCK_TYPES), np.array(table, np.int64))
         flat = cls(blocks, places)
@@ -118,7 +118,7 @@ class Flat:
         return flat
 
     def copy(self) -> "Flat":
-        """Return a copy whose numbers may be written to; yes and no are shared."""
+        """Return a copy whose numbers may be written to; booleans are shared."""
         f, i, b, table = self.blocks
         return Flat((f.copy(), i.copy(), b, table), self.places)
 
@@ -161,7 +161,7 @@ def zeros(record: Any, **sizes: int) -> Any:
 
 @cache
 def _maker(record: Any, **sizes: int) -> Callable[[], Any]:
-    """Return what makes a record of zeros: a step has no time to work out the shapes each time."""
+    """Return a function that makes a record of zeros: a step has no time to work out the shapes."""
     if hints := _hints(record):
         makers = [_maker(hint, **sizes) for hint in hints.values()]
         return lambda: record(*[make() for make in makers])
@@ -171,10 +171,10 @@ def _maker(record: Any, **sizes: int) -> Callable[[], Any]:
 
 
 def opener(record: type, *paths: str) -> Callable[[Blocks], Any]:
-    """Return what makes views of fields of a record, or of records in it, from its blocks, in Python and compiled.
+    """Return a function, for Python and for compiled code, that makes views of some fields of a record from its blocks.
 
-    It is a tuple of them. What is not opened costs nothing: open no more than a function needs. A compiled view does
-    not keep its block: it must not outlive the call that the block was given to.
+    It returns a tuple of them. A field that is not opened costs nothing: open no more than a function needs. A compiled
+    view does not keep its block alive: it must not outlive the call that has the block as an argument.
     """
     whole = _tree(record, [0])
     parts = [reduce(lambda part, name: part.fields[name], path.split("."), whole) for path in paths]
@@ -190,7 +190,7 @@ def opener(record: type, *paths: str) -> Callable[[Blocks], Any]:
     return open_parts
 
 
-def _view(part: _Part, blocks: Blocks) -> Any:
+def _view(part: _RecordNode, blocks: Blocks) -> Any:
     if part.fields:
         return part.kind(*(_view(field, blocks) for field in part.fields.values()))
     start, *shape = blocks[3][part.entry : part.entry + 1 + len(part.dimensions)]
@@ -198,7 +198,7 @@ def _view(part: _Part, blocks: Blocks) -> Any:
     return row.reshape(shape) if shape else row[0]
 
 
-def _type_of(part: _Part, blocks: Any) -> Any:
+def _type_of(part: _RecordNode, blocks: Any) -> Any:
     """Return Numba's type of a field or a record."""
     if part.fields:
         return types.BaseTuple.from_types([_type_of(field, blocks) for field in part.fields.values()], part.kind)
@@ -206,17 +206,17 @@ def _type_of(part: _Part, blocks: Any) -> Any:
     return block.copy(ndim=len(part.dimensions)) if part.dimensions else block.dtype
 
 
-def _write_views(parts: Sequence[_Part], context: Any, builder: Any, signature: Any, given: Any) -> Any:
-    """Write the machine's code that makes views: each needs its start and its sizes, and counts no references."""
+def _write_views(parts: Sequence[_RecordNode], context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    """Generate the machine code of views: each needs its start and its sizes, and counts no references."""
     blocks = [
         context.make_array(kind)(context, builder, value)
-        for kind, value in zip(signature.args[0], cgutils.unpack_tuple(builder, given[0]), strict=True)
+        for kind, value in zip(signature.args[0], cgutils.unpack_tuple(builder, arguments[0]), strict=True)
     ]
 
     def at(entry: int) -> Any:
         return builder.load(cgutils.gep_inbounds(builder, blocks[3].data, entry))
 
-    def write(part: _Part, kind: Any) -> Any:
+    def write(part: _RecordNode, kind: Any) -> Any:
         if part.fields:
             fields = map(write, part.fields.values(), kind.types)
             return context.make_tuple(builder, kind, list(fields))

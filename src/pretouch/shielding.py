@@ -1,4 +1,4 @@
-"""For a program that has its own loop and its own commander: what stands between them and the arm."""
+"""The controller as a filter between a program's own commander and its arm."""
 
 from dataclasses import replace
 
@@ -18,21 +18,21 @@ _STILL = (0.0, 0.0, 0.0)
 
 
 class Shield:
-    """Takes what a program wants (`Inputs.desired`) and returns what its arm may do; made by `shield`.
+    """Takes the motion that a program requests (`Inputs.desired`) and returns the motion that its arm may make.
 
-    To be called once a period, `controller.limits.period`; the arm is sent `command` of each step. Before the loop ends
-    `loop.come_to_rest` brings it to rest.
+    Call it once a period, `controller.limits.period`, and send `command` of each step to the arm. At the end of the
+    loop, `loop.come_to_rest` brings the arm to rest.
     """
 
     def __init__(self, controller: Controller, robot: RobotState, learnt: ResidualModel | None = None) -> None:
-        """Begin with an arm's state; one that cannot be used is a RobotStateError."""
+        """Start from an arm's state; an unusable state is a RobotStateError."""
         self.controller = controller
         self.state = controller.init(robot, learnt)
         self.cycle: Cycle | None = None
         """The last turn, for a recorder (`pretouch.Recording`)."""
 
     def __call__(self, inputs: Inputs) -> ControlStep:
-        """Return the step of a period; where nothing is desired, the hand stays where it is."""
+        """Return the step of one period; without a desired motion the hand stays where it is."""
         before, period = self.state, self.controller.limits.period
         now = instant(inputs.stamp, period, inputs.robot, inputs.readings, inputs.touch)
         robot = explained(self.controller, before, inputs.robot, now)
@@ -53,7 +53,7 @@ def shield(
         skin: on it.
         robot: state of the arm before the first step.
         profile: or the text of one; its `task.control_period_s` is the period of the program's loop (`at_rate`).
-        fixtures: what stands round the arm and is no obstacle; None for nothing.
+        fixtures: bodies around the arm that are no obstacles; None without any.
         learnt: free motion as an earlier session left it.
     """
     x, y, z = model.kinematics(robot.q).position[model.ee].tolist()

@@ -18,9 +18,9 @@ Handler = Callable[[int, FrameType | None], object] | signal.Handlers
 
 @contextmanager
 def handled(numbers: Iterable[int], handler: Handler) -> Iterator[dict[int, object]]:
-    """Handle signals so until the context ends, but those that are ignored, as nohup wants SIGHUP.
+    """Handle signals by a handler until the context ends; ignored ones stay ignored, as SIGHUP under nohup.
 
-    Gives the handlers from before. Signals reach the main thread alone: in another one nothing changes.
+    Yields the handlers from before. Signals reach the main thread alone: in another thread nothing changes.
     """
     if threading.current_thread() is not threading.main_thread():
         yield {}
@@ -36,7 +36,7 @@ def handled(numbers: Iterable[int], handler: Handler) -> Iterator[dict[int, obje
 
 @contextmanager
 def noted(*numbers: int) -> Iterator[list[int]]:
-    """Only note signals, all `ENDING` ones by default, until the context ends: the first comes then, before others."""
+    """Only note signals, by default all `ENDING` ones, until the context ends; the first one is raised then."""
     came: list[int] = []
     with handled(numbers or ENDING, lambda number, _frame: came.append(number)) as before:
         try:
@@ -49,13 +49,13 @@ def noted(*numbers: int) -> Iterator[list[int]]:
 
 @contextmanager
 def noted_in_motion() -> Iterator[list[int]]:
-    """Only note `ENDING` signals, and ignore those of a terminal that would stop the program where it is: Ctrl-Z."""
+    """Only note `ENDING` signals, and ignore those by which a terminal suspends the program: Ctrl-Z."""
     with handled(_STOPPING, signal.SIG_IGN), noted() as came:
         yield came
 
 
 def ended_in_order() -> AbstractContextManager[object]:
-    """Turn SIGTERM and SIGHUP, where they would end the process at once, into SystemExit."""
+    """Turn SIGTERM and SIGHUP into SystemExit where they would end the process at once."""
 
     def end(number: int, _frame: FrameType | None) -> None:
         raise SystemExit(128 + number)
@@ -66,9 +66,9 @@ def ended_in_order() -> AbstractContextManager[object]:
 
 @contextmanager
 def kept_from_children() -> Iterator[None]:
-    """Start a process in here, and what a terminal sends, as Ctrl-C, does not reach it from its first instruction on.
+    """Keep a terminal's signals, such as Ctrl-C, from a process started in this context, from its first instruction on.
 
-    It calls `leave_to_parent` as soon as it can, and its parent ends it.
+    The process calls `leave_to_parent` as soon as it can, and its parent ends it.
     """
     with handled((signal.SIGHUP, signal.SIGTSTP), signal.SIG_IGN):  # stays so in what outlives a terminal
         resource_tracker.ensure_running()  # begun with the first process, it would unblock Ctrl-C
@@ -107,7 +107,7 @@ def ends_raise() -> Iterator[None]:
 
 
 def ended() -> bool:
-    """Whether a signal has come that ends the command."""
+    """Return whether a signal has come that ends the command."""
     return bool(_received)
 
 

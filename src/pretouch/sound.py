@@ -1,4 +1,4 @@
-"""Inputs as values of known types, sizes and bounds, or what keeps them from being that."""
+"""Checks of the inputs: copies with known types, sizes and bounds, or the reason why an input is refused."""
 
 import reprlib
 from collections.abc import Callable
@@ -27,24 +27,24 @@ from pretouch.values import LATEST, WHOLE, Below, BoolArray, FloatArray, IntArra
 Input = TypeVar("Input")
 
 FASTEST = 2.0
-"""Times the arm's limit: a commanded joint velocity from here on is none that any arm was ever given."""
+"""Times the arm's limit: a commanded joint velocity of that size was never sent to an arm."""
 
 STRONGEST = 1e4
-"""An external torque [Nm] from here on is none."""
+"""An external torque [Nm] of this size is no measurement."""
 
 MOST_POINTS = 20_000
-"""Points of outside sources that are taken in one step: what they cost stays bounded."""
+"""Points of outside sources in one step, at most: their cost stays bounded."""
 
 _MOST_INSTANTS = 1000
 _ROUNDING = 1e-6
 """By how much the columns of a rotation may miss unit length and right angles."""
 _AHEAD_S = 60.0
-"""A horizon that begins so far in the future is stamped by another clock."""
+"""A horizon that begins so far in the future has the stamps of another clock."""
 _WIDTH = {DesiredKind.TWIST: 6, DesiredKind.POSE: 12}
 
 
 class _Field(NamedTuple):
-    """What a class of inputs declares of a field."""
+    """Declaration of a field of an input class."""
 
     name: str
     kind: Any
@@ -76,24 +76,24 @@ _COPY: dict[Any, Callable[[Any], Any]] = {
     IntArray: lambda numbers: _of_kind(numbers, "iu").astype(np.int64),
     BoolArray: lambda numbers: _of_kind(numbers, "biu") != 0,
 }
-"""What copies a field, by its annotation; what has another one is taken as it is."""
+"""Functions that copy a field, by its annotation; a field with another annotation is taken as it is."""
 _WORDS = {float: "number", IntArray: "array of whole numbers", BoolArray: "array of yes and no"}
 
 
-def taken(record: type[Input], given: object, **sizes: int) -> tuple[Input | None, str]:
-    """Copy an input as a value of its class: types, sizes and bounds are those that the class declares.
+def copy_input(record: type[Input], source: object, **sizes: int) -> tuple[Input | None, str]:
+    """Copy an input as a value of its class, with the types, sizes and bounds that the class declares.
 
-    Where it is something else, return None and what is wrong. `sizes` are of the dimensions that are known; another has
-    the size that it has in the first field that names it.
+    For another object return None and the reason. `sizes` are the sizes of known dimensions; the first field with
+    another dimension determines its size.
     """
     values = dict[str, Any]()
     for name, kind, dimensions, limit in _fields(record):  # type: ignore[arg-type]
         field = f"{record.__name__}.{name}"
         try:
-            value = getattr(given, name)
+            value = getattr(source, name)
             number = values[name] = _COPY[kind](value) if kind in _COPY else value
         except AttributeError:
-            return None, f"{reprlib.repr(given)} is no {record.__name__}"
+            return None, f"{reprlib.repr(source)} is no {record.__name__}"
         except (TypeError, ValueError, OverflowError):
             return None, f"{field} is {reprlib.repr(value)}, no {_WORDS.get(kind, 'array of numbers')}"
         if dimensions and number is not None:
@@ -110,19 +110,19 @@ def taken(record: type[Input], given: object, **sizes: int) -> tuple[Input | Non
 
 
 class UsualInputs:
-    """The inputs of nearly every step: reports of the arm and its units, of the usual types, and nothing beside."""
+    """Copies the inputs of nearly every step: reports of the arm and its units, of the usual types, and no others."""
 
     def __init__(self, blank: Flat) -> None:
-        """Take what a step begins with, see `line_records.Now`."""
+        """Take the values that a step starts from, see `line_records.Now`."""
         at = {name: place.at for name, place in blank.places.items()}
         self._joints = slice(at["robot.q"].start, at["robot.wrench"].stop)
-        self._heard = slice(at["readings.stamp"].start, at["readings.distance"].stop)
+        self._readings = slice(at["readings.stamp"].start, at["readings.distance"].stop)
         self._status, self._stamps = at["readings.status"], (at["stamp"].start, at["robot.stamp"].start)
         n, self._units = len(blank.get("robot.q")), len(blank.get("readings.status"))
         self._sizes = [n, n, n, n, n, 6]
 
-    def copied(self, now: Flat, inputs: Inputs) -> bool:
-        """Copy inputs that are as usual into a step; say whether they are."""
+    def copy(self, now: Flat, inputs: Inputs) -> bool:
+        """Copy usual inputs into a step; return whether they are usual."""
         robot, readings, units = inputs.robot, inputs.readings, self._units
         if inputs.resume or inputs.points is not None or inputs.payload is not None:
             return False
@@ -137,7 +137,7 @@ class UsualInputs:
                 return False
             numbers, whole = now.blocks[0], now.blocks[1]
             np.concatenate(parts, out=numbers[self._joints])
-            np.concatenate((stamps, distance), out=numbers[self._heard])
+            np.concatenate((stamps, distance), out=numbers[self._readings])
             whole[self._status] = status
             numbers[self._stamps[0]], numbers[self._stamps[1]] = inputs.stamp, robot.stamp
             return True
@@ -146,7 +146,7 @@ class UsualInputs:
 
 
 def time_of(stamp: object) -> float | None:
-    """Return a time stamp [s], or None if it is none."""
+    """Return a time stamp [s], or None for anything else."""
     try:
         time = real_number(stamp)
     except (TypeError, ValueError, OverflowError):
@@ -155,14 +155,14 @@ def time_of(stamp: object) -> float | None:
 
 
 def sound_robot(robot: RobotState, qd_max: FloatArray) -> tuple[RobotState | None, str]:
-    """Copy a robot's state, or say what keeps it from being that of an arm with these limits (n,) [rad/s].
+    """Copy a robot's state, or say why no arm with these limits (n,) [rad/s] can have it.
 
-    External torques that an arm cannot have are NaN.
+    External torques that no arm can have become NaN.
     """
     n = len(qd_max)
-    sound, wrong = taken(RobotState, robot, n=n)
+    sound, wrong = copy_input(RobotState, robot, n=n)
     if sound is None and "tau_ext" in wrong:
-        sound, wrong = taken(RobotState, replace(robot, tau_ext=np.full(n, np.nan)), n=n)
+        sound, wrong = copy_input(RobotState, replace(robot, tau_ext=np.full(n, np.nan)), n=n)
     if sound is None:
         return None, wrong
     fast = ~(np.abs(sound.qd_commanded) < FASTEST * qd_max)
@@ -173,20 +173,20 @@ def sound_robot(robot: RobotState, qd_max: FloatArray) -> tuple[RobotState | Non
 
 
 def sound_readings(readings: RangeReadings, units: int) -> tuple[RangeReadings, str]:
-    """Copy readings; of those that do not fit so many units, take none and say why."""
-    sound, wrong = taken(RangeReadings, readings, K=units)
+    """Copy readings; where they do not fit the number of units, return none and the reason."""
+    sound, wrong = copy_input(RangeReadings, readings, K=units)
     if sound is None:
         sound = RangeReadings(np.full(units, -np.inf), np.zeros(units), np.full(units, int(RangeStatus.NONE)))
     return sound, wrong
 
 
 def sound_touch(touch: TouchReadings | None, units: int) -> tuple[TouchReadings | None, str]:
-    """Copy touch readings; of those that do not fit so many units, take none and say why.
+    """Copy touch readings; where they do not fit the number of units, return none and the reason.
 
-    A stamp that is no number is that of a unit that was never heard; a force that is no number, or below 0, is not
-    measured. None stays None: a skin without touch sensors.
+    A stamp of NaN is that of a unit that has not reported yet; a force of NaN or below 0 is not measured. None stays
+    None: a skin without touch sensors.
     """
-    sound, wrong = (None, "") if touch is None else taken(TouchReadings, touch, K=units)
+    sound, wrong = (None, "") if touch is None else copy_input(TouchReadings, touch, K=units)
     if sound is not None:
         sound.stamp[np.isnan(sound.stamp)] = -np.inf
         sound.force[~((sound.force >= 0.0) & (sound.force < STRONGEST))] = np.nan
@@ -194,44 +194,44 @@ def sound_touch(touch: TouchReadings | None, units: int) -> tuple[TouchReadings 
 
 
 def sound_points(points: SeenPoints | None) -> tuple[SeenPoints | None, str]:
-    """Copy points of outside sources; of those that cannot be used, take none and say why.
+    """Copy points of outside sources; where they cannot be used, return None and the reason.
 
-    A set of which more than half the points are implausible cannot be used; single ones are left out later.
+    A set with more than half of its points implausible cannot be used; single points are left out later.
     """
-    sound, wrong = (None, "") if points is None else taken(SeenPoints, points)
+    sound, wrong = (None, "") if points is None else copy_input(SeenPoints, points)
     if sound is None:
         return None, wrong and f"cannot be used ({wrong})"
     if len(sound.stamp) > MOST_POINTS:
         return None, f"gives {len(sound.stamp)} points, more than {MOST_POINTS}"
     good, none = usable(sound.stamp, sound.point, sound.sigma)
-    shown = len(sound.stamp) - none
-    if 2 * good < shown:
+    count = len(sound.stamp) - none
+    if 2 * good < count:
         return None, (
-            f"gives {shown - good} implausible points of {shown}: a coordinate of {FARTHEST:g} m or more, or a sigma"
+            f"gives {count - good} implausible points of {count}: a coordinate of {FARTHEST:g} m or more, or a sigma"
             f" outside 0 to {LARGEST_SIGMA:g} m"
         )
     return sound, ""
 
 
 def sound_moving(moving: MovingFixtures | None, now: float, longest: float) -> tuple[MovingFixtures | None, str]:
-    """Copy moving fixtures; of those that cannot be used, take none and say why.
+    """Copy moving fixtures; where they cannot be used, return None and the reason.
 
-    Silence is no free space: what was somewhere longer than `longest` [s] ago may be anywhere by `now` [s].
+    Silence is no free space: a body that was reported longer than `longest` [s] before `now` [s] may be anywhere.
     """
-    sound, wrong = (None, "") if moving is None else taken(MovingFixtures, moving)
+    sound, wrong = (None, "") if moving is None else copy_input(MovingFixtures, moving)
     if sound is None or len(sound.radius) == 0:
         return None, wrong and f"cannot be used ({wrong})"
     if (sound.radius < 0.0).any():
         return None, f"have a radius of {sound.radius.min():g} m"
     if sound.stamp == -np.inf:
-        return None, "have not been told of yet"
+        return None, "have not been reported yet"
     if not abs(now - sound.stamp) <= longest:
-        return None, f"were last known {now - sound.stamp:.3f} s ago"
+        return None, f"were last reported {now - sound.stamp:.3f} s ago"
     return sound, ""
 
 
 def sound_payload(payload: Payload | None, most_kg: float) -> tuple[Payload | None, str]:
-    """Return an announced payload, or None and what is wrong with it for an arm that can hold so much [kg]."""
+    """Return an announced payload, or None and the reason; `most_kg` is the load that the arm can hold [kg]."""
     if payload is None or (isinstance(payload, Payload) and payload.mass_kg <= most_kg):
         return payload, ""
     if not isinstance(payload, Payload):
@@ -240,7 +240,7 @@ def sound_payload(payload: Payload | None, most_kg: float) -> tuple[Payload | No
 
 
 def sound_desired(desired: Desired | None, joints: int, now: float) -> tuple[Desired | None, str]:
-    """Copy a desired motion for an arm of so many joints, or say what keeps it from being one."""
+    """Copy a desired motion for an arm with a number of joints, or say why it is none."""
     if desired is None:
         return None, ""
     if reason := getattr(desired, "refused", ""):
@@ -249,7 +249,7 @@ def sound_desired(desired: Desired | None, joints: int, now: float) -> tuple[Des
         kind = DesiredKind(desired.kind)
     except (AttributeError, ValueError):
         return None, f"{reprlib.repr(desired)} is of no kind of a Desired"
-    sound, wrong = taken(Desired, desired, w=_WIDTH.get(kind, joints))
+    sound, wrong = copy_input(Desired, desired, w=_WIDTH.get(kind, joints))
     if sound is None:
         return None, wrong
     stamp, number = sound.stamp, sound.number

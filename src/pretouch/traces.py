@@ -1,4 +1,4 @@
-"""What was measured over some time: arrays by instant."""
+"""Time series of measurements: arrays by instant."""
 
 from dataclasses import fields, replace
 from typing import Self
@@ -11,7 +11,7 @@ from pretouch.values import value
 
 @value
 class ImuTrace:
-    """What the IMU of one unit measured, by time. M samples, sensor frame."""
+    """Measurements of one unit's IMU by time. M samples, sensor frame."""
 
     stamp: FloatArray
     """(M,) [s]."""
@@ -37,7 +37,7 @@ class JointTrace:
 
 
 def on_grid(time: FloatArray, begin: float, spacing: float, values: FloatArray) -> FloatArray:
-    """Values (N, ...) at instants (N,) [s] of what is known (G, ...) from `begin` on at a spacing [s], linearly."""
+    """Interpolate values (G, ...), which begin at `begin` and have a spacing [s], at instants (N,) [s], linearly."""
     place = np.clip((time - begin) / spacing, 0.0, len(values) - 1.000001)
     left = place.astype(np.int64)
     share = (place - left).reshape(-1, *[1] * (values.ndim - 1))

@@ -1,6 +1,6 @@
-"""The values that travel along the line from a reading to a joint velocity.
+"""The values between a reading and a joint velocity.
 
-All are set once, when they are made; arrays are read and not written to (`docs/reference/conventions.md`).
+Fields are set once, at construction; arrays are read and never written to (`docs/reference/conventions.md`).
 """
 
 from collections.abc import Callable
@@ -37,7 +37,7 @@ class Obstacles(NamedTuple):
     """K sensed points, each with its closest point on the robot's body. Base frame."""
 
     unit: Annotated[IntArray, "K"]
-    """(K,) index of the sensing unit in the skin; from their number on, of an outside point, then a moving fixture."""
+    """(K,) index of the sensing unit in the skin; the indices after those are outside points, then moving fixtures."""
     point: Annotated[FloatArray, "K", 3]
     """(K, 3) obstacle positions, eq. 1 [m]."""
     ee_distance: Annotated[FloatArray, "K"]
@@ -56,26 +56,21 @@ class Obstacles(NamedTuple):
 
 @compiled
 def no_obstacles(count: int = 0) -> Obstacles:
-    """Return no obstacles, with room for so many."""
-    of_each, points = np.zeros(count), np.zeros((count, 3))
-    return Obstacles(
-        np.zeros(count, np.int64), points, of_each, points.copy(), np.zeros(count, np.int64), points.copy(),
-        of_each.copy(), of_each.copy(),
-    )  # fmt: skip
+    """Return no obstacles, with room for a number of them."""
+    index, number, point = np.zeros(count, np.int64), np.zeros(count), np.zeros((count, 3))
+    return Obstacles(index, point, number, point.copy(), index.copy(), point.copy(), number.copy(), number.copy())
 
 
 @compiled
 def some_of(obstacles: Obstacles, first: int, end: int) -> Obstacles:
-    """Return obstacles from the first up to, and without, the end, as views."""
-    o, m = obstacles, slice(first, end)
-    return Obstacles(
-        o.unit[m], o.point[m], o.ee_distance[m], o.body_point[m], o.link[m], o.direction[m], o.body_distance[m],
-        o.closing_speed[m],
-    )  # fmt: skip
+    """Return views of the obstacles from `first` to before `end`."""
+    unit, point, ee, on_body, link, direction, distance, closing = obstacles
+    m = slice(first, end)
+    return Obstacles(unit[m], point[m], ee[m], on_body[m], link[m], direction[m], distance[m], closing[m])
 
 
 class Report(NamedTuple):
-    """As `RobotState`; a wrench of NaN is none."""
+    """`RobotState` as a record; a wrench of NaN stands for no estimate."""
 
     stamp: Cell
     q: Annotated[FloatArray, "n"]
@@ -87,7 +82,7 @@ class Report(NamedTuple):
 
 
 class Thresholds(NamedTuple):
-    """Contact thresholds of the three axes (eq. 9) and what they are made of. All (3,) [N], base frame."""
+    """Contact thresholds of the three axes (eq. 9) and their components. All (3,) [N], base frame."""
 
     upper: FloatArray
     """T_u."""
@@ -105,7 +100,7 @@ class Thresholds(NamedTuple):
 
 @value
 class Contact:
-    """A contact found in one step."""
+    """A contact that is detected in one step."""
 
     force: FloatArray
     """(3,) external force F_ext = F_reading - mu of eq. 12 [N], base frame."""
@@ -114,7 +109,7 @@ class Contact:
 
 
 class Touched(NamedTuple):
-    """Where the arm is touched: C = 1 contact; none where no contact is detected. Base frame."""
+    """Place and force of a contact: C = 1, or 0 where no contact is detected. Base frame."""
 
     link: IntArray
     """(C,) index of the link that carries each place; links that the same joints move differ in place only."""
@@ -129,7 +124,7 @@ class Touched(NamedTuple):
 
 
 NOT_TOUCHED = Touched(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
-"""No contact is detected. One of these for all steps: its arrays are not written to either."""
+"""No contact is detected. All steps share this value: its arrays are never written to."""
 
 
 @value
@@ -144,13 +139,13 @@ class QpSolution:
     """(n + K,) multipliers of joint box and rows, positive at an upper and negative at a lower bound."""
     outcome: QpOutcome
     status: str
-    """What happened, as a sentence."""
+    """The outcome as a sentence."""
     violated: bool = False
-    """Whether a solution violates a soft row, also one that belongs to no obstacle."""
+    """True if the solution violates a soft row, also one that belongs to no obstacle."""
 
 
 class _LookedUp:
-    """A value whose fields are looked up in the numbers of a step when they are first asked for."""
+    """A value whose fields are read from the record of a step at their first use."""
 
     __slots__ = ("_mode", "_now")
 
@@ -158,7 +153,7 @@ class _LookedUp:
     _mode: ModeState
 
     def __getattr__(self, name: str) -> Any:
-        """Look a field up that nobody has set."""
+        """Read a field that has not been set."""
         if name in _PLACES:
             number = _PLACES[name](self._now)
         elif name in ModeState.__slots__:
@@ -171,18 +166,18 @@ class _LookedUp:
 
 @value
 class ControlStep(_LookedUp):
-    """All that one step of the controller saw and decided: what figures and reports read, of any arm."""
+    """Perception, decision and command of one control step: the source of figures and reports, for any arm."""
 
     stamp: float
     mode: Mode
     event: Event
-    """What made the mode so; of a HOLD that lasts, what began it."""
+    """Cause of the mode; of a HOLD that lasts, the event at its beginning."""
     detail: str
-    """What `reason` says of this step, a part of its sentence."""
+    """Details of this step, which `reason` contains."""
     reason: str
-    """Why the arm is in this mode, as a sentence (`modes.TABLE`); `explain` says what it does in it."""
+    """Sentence on the cause of the mode (`modes.TABLE`); `explain` describes the motion in it."""
     latched: bool
-    """Whether the HOLD lasts until a person resumes."""
+    """True if the HOLD lasts until a person resumes."""
     q: FloatArray
     """(n,) measured joint positions [rad]."""
     q_commanded: FloatArray
@@ -192,15 +187,15 @@ class ControlStep(_LookedUp):
     ee_velocity: FloatArray
     """(3,) measured end-effector velocity [m/s]."""
     path_position: FloatArray
-    """(3,) where on the path the arm should be, or where it is while a commander asks [m]."""
+    """(3,) desired position on the path; the actual position while a commander moves the arm [m]."""
     path_phase: float
     """Arc length travelled along the path [m]."""
     desired_velocity: FloatArray
-    """(3,) end-effector velocity asked of the QP [m/s]."""
+    """(3,) desired end-effector velocity of the QP [m/s]."""
     speed_scale: float
     """Factor on the velocity along the path in [0, 1]: eq. 3 or that of units falling silent, faded by eq. 4."""
     range_distance: FloatArray
-    """(K,) distances of the readings used [m], NaN where the unit reported no target."""
+    """(K,) distances of the readings [m], NaN where the unit reported no target."""
     obstacles: Obstacles
     force: FloatArray
     """(3,) the robot's estimate of the external force less an announced load's [N], NaN where it has none."""
@@ -208,50 +203,50 @@ class ControlStep(_LookedUp):
     """(3,) newest value added to the window, eq. 8 [N]."""
     thresholds: Thresholds
     armed: bool
-    """Whether the window is full, so that a contact can be detected."""
+    """True if the force window is full, so that a contact can be detected."""
     contact: Contact | None
-    """The contact detected in this very step."""
+    """The contact that is detected in this step."""
     reaction_velocity: FloatArray
     """(3,) end-effector velocity of the reaction under way, zero otherwise [m/s]."""
     restricted: IntArray
-    """(K',) which of the obstacles restrict the arm."""
+    """(K',) indices of the obstacles that restrict the arm."""
     approach_limit: FloatArray
-    """(K',) approach limit for each of them, of eq. 7 or in mode braking of the braking curve [m/s]."""
+    """(K',) approach limit of each, by eq. 7 or the braking curve [m/s]."""
     qp: QpSolution
     command: FloatArray
     """(n,) joint velocity command [rad/s]."""
     residual: FloatArray
-    """(n,) external joint torques less what the detector takes for free motion [Nm], NaN where there are none."""
+    """(n,) external joint torques less the detector's model of free motion [Nm], NaN without torques."""
     evidence: float
-    """How far the detector is on the way to a contact: one from 1 on, while armed."""
+    """Evidence for a contact: from 1 on there is one, while armed."""
     touched: Touched = field(default_factory=lambda: NOT_TOUCHED)
-    """Where the arm is touched; empty where no contact is detected or the profile does not localise."""
+    """Place and force of the contact; empty where none is detected or the profile does not localise."""
     detectable_n: float = np.nan
-    """Force at the end-effector that is found, see `Detection.detectable_n` [N]."""
+    """Smallest force at the end-effector that is detected, see `Detection.detectable_n` [N]."""
 
     @classmethod
-    def of(cls, now: Flat, mode: ModeState, **known: Any) -> "ControlStep":
-        """Return the step of such numbers, see `line_records.Now`, and a mode; `known` are fields of other values."""
+    def of(cls, now: Flat, mode: ModeState, **fields: Any) -> "ControlStep":
+        """Return the step of a record `line_records.Now` and a mode; `fields` have other values than the record."""
         step = object.__new__(cls)
         step._now, step._mode = now, mode
-        for name, number in known.items():
+        for name, number in fields.items():
             setattr(step, name, number)
         return step
 
     @property
     def limited(self) -> Limited:
-        """What keeps the arm from what is asked, and what is left of it."""
+        """The limit that keeps the arm from the desired motion, and the part of it that remains."""
         return limited_by(self)
 
 
 def _obstacles(now: Flat) -> Obstacles:
-    count = now.get("seen.all")
-    return Obstacles(*(now.get(f"seen.near.{name}")[:count] for name in Obstacles._fields))
+    count = now.get("scene.total")
+    return Obstacles(*(now.get(f"scene.near.{name}")[:count] for name in Obstacles._fields))
 
 
 def _solution(now: Flat) -> QpSolution:
-    seen, qd = now.get("answer.seen"), now.get("answer.command")
-    slack, multipliers = now.get("answer.slack")[:seen], now.get("answer.multipliers")[: len(qd) + seen]
+    rows, qd = now.get("answer.rows"), now.get("answer.command")
+    slack, multipliers = now.get("answer.slack")[:rows], now.get("answer.multipliers")[: len(qd) + rows]
     how = outcome_of(bool(now.get("request.hold")), now.get("answer.ending"), bool(now.get("answer.violated")))
     return QpSolution(qd, slack, multipliers, *how)
 
@@ -261,7 +256,7 @@ _PLACES: dict[str, Callable[[Flat], Any]] = {
     for name, path in {
         "stamp": "stamp", "q": "robot.q", "q_commanded": "robot.q_commanded", "ee_position": "ee",
         "path_position": "path.point", "path_phase": "path.phase", "desired_velocity": "request.velocity",
-        "speed_scale": "path.scale", "range_distance": "seen.distance", "filtered_force": "filtered_force",
+        "speed_scale": "path.scale", "range_distance": "scene.distance", "filtered_force": "filtered_force",
         "command": "answer.command",
         "residual": "detection.residual", "evidence": "detection.log_likelihood_ratio",
         "detectable_n": "detection.detectable_n",
@@ -270,8 +265,8 @@ _PLACES: dict[str, Callable[[Flat], Any]] = {
     "ee_velocity": lambda now: now.get("answer.velocities")[0], "obstacles": _obstacles,
     "force": lambda now: now.get("robot.wrench")[:3], "thresholds": lambda now: Thresholds(*now.get("detection.bands")),
     "armed": lambda now: True, "contact": lambda now: None, "reaction_velocity": lambda now: np.zeros(3),
-    "restricted": lambda now: now.get("answer.which")[: now.get("answer.seen")],
-    "approach_limit": lambda now: now.get("answer.limit")[: now.get("answer.seen")], "qp": _solution,
+    "restricted": lambda now: now.get("answer.which")[: now.get("answer.rows")],
+    "approach_limit": lambda now: now.get("answer.limit")[: now.get("answer.rows")], "qp": _solution,
     "touched": lambda now: NOT_TOUCHED,
 }  # fmt: skip
-"""Where each field is found that a step in one call leaves to be looked up."""
+"""How each field of a step in one call is read from its record, by the field's name."""

@@ -1,4 +1,4 @@
-"""Values that each control step makes anew, and arrays by what they hold; shapes stand where arrays are used."""
+"""Types of arrays, and of the values that each control step makes; shapes stand where arrays are used."""
 
 from dataclasses import dataclass
 from typing import NamedTuple, TypeVar, cast, dataclass_transform
@@ -13,15 +13,15 @@ Number = TypeVar("Number", float, FloatArray)
 
 
 class Below(NamedTuple):
-    """Annotates a field: its numbers are smaller in size; one that is not has another unit, or is broken."""
+    """Annotates a field with the bound of its numbers' size; a larger number has another unit, or is broken."""
 
     limit: float
 
 
 LARGEST = Below(1e3)
-"""Of a desired number, a joint position or velocity [rad, rad/s, m, m/s]."""
+"""Bound on desired numbers, joint positions and joint velocities [rad, rad/s, m, m/s]."""
 LATEST = Below(1e12)
-"""Of a time stamp [s], whatever the clock began with."""
+"""Bound on time stamps [s], wherever the clock starts."""
 
 _FLOAT = np.dtype(np.float64)
 WHOLE = np.dtype(np.int64)
@@ -43,7 +43,7 @@ def real(numbers: object, copy: bool = True) -> FloatArray:
 
 
 def real_number(number: object) -> float:
-    """Return a real number as a float; what is none is a TypeError, a ValueError or an OverflowError."""
+    """Return a real number as a float; anything else is a TypeError, a ValueError or an OverflowError."""
     return float(number if isinstance(number, float | int) else real(number)[()])
 
 
@@ -52,9 +52,9 @@ Class = TypeVar("Class", bound=type)
 
 @dataclass_transform(frozen_default=True)
 def value(cls: Class) -> Class:
-    """Make a class a dataclass with slots whose fields are set once, when it is made.
+    """Make a class a dataclass with slots whose fields are set once, at construction.
 
-    The type checker holds everybody to that. Python itself does not: it would take three times as long to make one, and
-    a control step makes some twenty, with a hundred fields.
+    The type checker enforces that. Python does not: construction would take three times as long, and a control step
+    constructs some twenty values with a hundred fields.
     """
     return cast(Class, dataclass(slots=True)(cls))

@@ -167,11 +167,7 @@ def test_it_takes_energy_and_gives_none_whatever_is_pushed(pushes, bias, seed, a
     """Through a lagging, noisy and biased estimate, and an arm that cannot accelerate at once."""
     rng, keep = np.random.default_rng(seed), math.exp(-DT / P.lag_s)
     noise = 0.5 / ((1 + keep) / (1 - keep))  # with the bias within the dead band
-    state, command, estimate = (
-        begun(P, READY, np.zeros(N), np.zeros(N), BAND),
-        np.zeros(N),
-        np.zeros(N),
-    )
+    state, command, estimate = (begun(P, READY, np.zeros(N), np.zeros(N), BAND), np.zeros(N), np.zeros(N))
     taken, most, strongest = 0.0, 0.0, 0.0
     course = [*pushes, (60 + int(2.0 / (acceleration * DT)), [0.0, 0.0])]
     for samples, torques in course:

@@ -7,7 +7,14 @@ import pytest
 from tests.following_arm import DT, controller_of, on_its_way
 from tests.recording.runs import Run, assert_replays
 
-from pretouch.contact.announced_load import announced, doubted, kept_free, most_kg, without_load, wrench_of
+from pretouch.contact.announced_load import (
+    announce,
+    most_kg,
+    store_free_torques,
+    widen_for_load,
+    without_load,
+    wrench_of,
+)
 from pretouch.contact.residual_model import residual_init
 from pretouch.errors import ParameterError
 from pretouch.params import SequentialParams
@@ -29,10 +36,10 @@ def left(model, given: list[tuple[Payload | None, RobotState]]) -> list[RobotSta
     """What is left of the arm's state after each step."""
     state, found, kin = None, [], model.kinematics(model.description.q_ready)
     for said, now in given:
-        state = announced(state, said, now)
+        state = announce(state, said, now)
         if state is not None:
             now, state = without_load(state, model, kin, now, DT)
-            state = kept_free(state, now.tau_ext, now.tau_ext)
+            state = store_free_torques(state, now.tau_ext, now.tau_ext)
         found.append(now)
     return found
 
@@ -65,7 +72,7 @@ def test_the_torques_are_those_of_a_point_mass_by_its_own_jacobian(panda_model):
     kin = panda_model.kinematics(q)
     payload = Payload(1.5, (0.05, -0.02, 0.1), within_s=0.0)
     state = RobotState(0.0, q, STILL, q, STILL, STILL, np.zeros(6))
-    after, _ = without_load(announced(None, payload, state), panda_model, kin, state, DT)
+    after, _ = without_load(announce(None, payload, state), panda_model, kin, state, DT)
     point = kin.position[panda_model.ee] + kin.rotation[panda_model.ee] @ payload.com_m
     J = panda_model.jacobian(kin, panda_model.ee, point)[:3]
     np.testing.assert_allclose(after.tau_ext, -J.T @ [0.0, 0.0, -9.81 * 1.5], atol=1e-12)
@@ -78,7 +85,7 @@ def test_a_load_that_is_swung_about_the_base_pulls_outwards(panda_model):
         q[0] = 2.0 * DT * k
         now, kin = RobotState(DT * k, q, qd, q, qd, STILL, np.zeros(6)), panda_model.kinematics(q)
         after, state = without_load(
-            announced(state, Payload(1.5, within_s=0.0), now), panda_model, kin, now, DT
+            announce(state, Payload(1.5, within_s=0.0), now), panda_model, kin, now, DT
         )  # fmt: skip
     out = kin.position[panda_model.ee] * [1.0, 1.0, 0.0]
     load, r = -after.wrench[:3], float(np.linalg.norm(out))
@@ -123,17 +130,17 @@ def test_without_torques_the_force_says_how_much_has_come(panda_model):
 
 
 def test_what_was_said_stays_and_saying_it_again_changes_nothing(panda_model):
-    once, often = (announced(None, Payload(1.0), robot(panda_model)) for _ in range(2))
-    assert announced(once, None, robot(panda_model)) is once
-    assert announced(often, Payload(1.0), robot(panda_model)) is often
-    assert announced(None, None, robot(panda_model)) is None
-    changed = announced(replace(once, waited=3.0), Payload(0.0), robot(panda_model))
+    once, often = (announce(None, Payload(1.0), robot(panda_model)) for _ in range(2))
+    assert announce(once, None, robot(panda_model)) is once
+    assert announce(often, Payload(1.0), robot(panda_model)) is often
+    assert announce(None, None, robot(panda_model)) is None
+    changed = announce(replace(once, waited=3.0), Payload(0.0), robot(panda_model))
     assert (changed.before, changed.waited) == (Payload(1.0), 0.0)
 
 
 def test_a_model_that_doubts_a_load_knows_its_other_weights_as_before():
     model = residual_init(7, SequentialParams())
-    more = doubted(model, 2.0).covariance - model.covariance
+    more = widen_for_load(model, 2.0).covariance - model.covariance
     expected = np.zeros_like(more)
     expected[:, -1, -1], expected[:, 0, 0] = 0.1**2, (2.0 * 9.81 * 0.02) ** 2
     np.testing.assert_allclose(more, expected, atol=1e-12)

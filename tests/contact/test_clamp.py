@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.contact.clamp import caught_between, clamp_init, clamped, note_place, opened
+from pretouch.contact.clamp import begin_pinch, clamp_init, note_place, open_clamp, update_clamp
 from pretouch.contact.virtual_mass import MARKS
 from pretouch.params import ClampParams
 
@@ -21,7 +21,7 @@ def judged(*course):
     for cycles, torque, velocity in course:
         for _ in range(cycles):
             if not state.torque:
-                state = clamped(state, torque, velocity, Q, DT, P)
+                state = update_clamp(state, torque, velocity, Q, DT, P)
     return state
 
 
@@ -63,7 +63,7 @@ def moved() -> tuple:
     state, q = clamp_init(Q), Q
     for _ in range(100):
         q = q + 0.003 * WAY
-        state = clamped(state, 10.0 * WAY, 0.3 * WAY, q, DT, P)
+        state = update_clamp(state, 10.0 * WAY, 0.3 * WAY, q, DT, P)
     return replace(state, torque=8.0), q
 
 
@@ -71,7 +71,7 @@ def test_it_opens_the_way_it_came_and_ends_by_time():
     state, q = moved()
     start, cycles = q, 0
     while not state.open:
-        way, state = opened(state, 0.0 * WAY, q, DT, P)
+        way, state = open_clamp(state, 0.0 * WAY, q, DT, P)
         assert way[0] < 0
         assert not way[1:].any()
         q, cycles = q + np.clip(way, -0.2, 0.2) * DT, cycles + 1
@@ -82,7 +82,7 @@ def test_it_opens_the_way_it_came_and_ends_by_time():
 def test_it_ends_where_the_way_began():
     state, q = moved()
     for _ in range(49):
-        way, state = opened(state, 0.0 * WAY, q, DT, P)
+        way, state = open_clamp(state, 0.0 * WAY, q, DT, P)
         q = q + np.clip(way, -5.0, 5.0) * DT
     assert state.open
     # the trail holds the last 12 places, 0.05 s apart
@@ -93,7 +93,7 @@ def test_it_does_not_open_into_what_pushes_it():
     state, q = moved()
     for i in range(3):
         assert not state.open, i
-        _, state = opened(state, 12.0 * WAY, q, DT, P)
+        _, state = open_clamp(state, 12.0 * WAY, q, DT, P)
     assert state.open
 
 
@@ -110,14 +110,14 @@ def come(cycles: int = 60):
 
 def test_the_arm_opens_the_way_it_came_and_does_not_close_again_what_has_been_opened_already():
     path, q = come()
-    begun = caught_between(replace(clamp_init(q), came=1.0 * WAY), path, "one and other", 50.0, 6.0 * WAY)
+    begun = begin_pinch(replace(clamp_init(q), came=1.0 * WAY), path, "one and other", 50.0, 6.0 * WAY)
     # where it was caught, and four places of the way farther back
     for at in (q, q - 0.22 * WAY):
-        way, state = opened(begun, -6.0 * WAY, at, DT, P)
+        way, state = open_clamp(begun, -6.0 * WAY, at, DT, P)
         assert way @ WAY < 0.0
         assert way - (way @ WAY) * WAY == pytest.approx(np.zeros(N))
         assert not state.open
-    beyond, state = opened(state, -6.0 * WAY, -1.0 * WAY, DT, P)
+    beyond, state = open_clamp(state, -6.0 * WAY, -1.0 * WAY, DT, P)
     assert beyond == pytest.approx(np.zeros(N))
     assert state.open
 

@@ -11,13 +11,7 @@ from tests.contact.alone import sample, something, standing
 from tests.examples import examples
 
 from pretouch.contact.detector import Body
-from pretouch.contact.localisation import (
-    NO_CONTACT,
-    LocalisationState,
-    candidate_poses,
-    hidden_candidates,
-    localise,
-)
+from pretouch.contact.localisation import NO_CONTACT, LocalisationState, candidate_poses, hidden_candidates, localise
 from pretouch.contact.posterior import Candidates, log_posterior, log_prior
 from pretouch.contact.scatter import LENGTHS
 from pretouch.contact.sequential_step import SampleTest

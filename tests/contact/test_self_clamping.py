@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pretouch.contact.clamp import find_self_clamp, presses_on_fixture
+from pretouch.contact.clamp import find_pinch, presses_on_fixture
 from pretouch.contact.detector import Body
 from pretouch.params import PinchParams
 from pretouch.robot.body import Capsules, no_capsules, placed
@@ -54,7 +54,7 @@ def squeezed(model: RobotModel, newtons: float, tilt: float = 0.0) -> FloatArray
 
 
 def found(model: RobotModel, torque: FloatArray, q: FloatArray = FOLDED, qd: FloatArray = FOLDING):
-    return find_self_clamp(model, model.kinematics(q), torque, NOISE, qd, P)
+    return find_pinch(model, model.kinematics(q), torque, NOISE, qd, P)
 
 
 MASS = '<inertial pos="0 0 0" mass="1" diaginertia=".01 .01 .01"/>'
@@ -73,7 +73,7 @@ def test_between_base_and_second_link_nothing_is_looked_for(tmp_path: Path, join
     one, rest = np.ones(joints), np.zeros(joints)
     model = RobotModel(RobotDescription("made", tmp_path / "arm.xml", f"l{joints}", one, one, one, rest, "made"))
     first = np.eye(joints)[0]
-    pinch = find_self_clamp(model, model.kinematics(0.4 * first), 9.0 * first, np.eye(joints), -0.7 * first, P)
+    pinch = find_pinch(model, model.kinematics(0.4 * first), 9.0 * first, np.eye(joints), -0.7 * first, P)
     assert (pinch is not None) is caught
     if pinch is not None:
         assert pinch[2] == pytest.approx(9.0 / 0.15, rel=0.1)

@@ -29,7 +29,7 @@ def thresholds(
 def crossed(force: tuple[float, float, float], near: Obstacles | None = None) -> list[bool] | None:
     """Axes of a contact with this force, of a mean of 0, to an end-effector at (0.4, 0, 0.5); None for no contact."""
     detector, window = MovingThresholds(compare="raw"), window_init(2)
-    found = detector.judged(window, np.array(force), True, np.array([0.4, 0.0, 0.5]), near or no_obstacles())
+    found = detector.judge(window, np.array(force), True, np.array([0.4, 0.0, 0.5]), near or no_obstacles())
     return found.contact and found.contact.axes.tolist()
 
 
@@ -110,7 +110,7 @@ def detect(
     state: Window, force: np.ndarray | None, obstacles: Obstacles, params: MovingThresholds
 ) -> tuple[Detection, Window]:
     window = add_force(state, force, WindowParams())
-    return params.judged(window, force, state.full, EE, obstacles), window
+    return params.judge(window, force, state.full, EE, obstacles), window
 
 
 def quiet(samples: int = 100) -> Window:

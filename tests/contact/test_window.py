@@ -108,7 +108,7 @@ def test_eq_12_by_numbers(force: tuple, compliance: float, velocity: tuple):
 
 def test_decay_is_linear_and_ends():
     part = DecayingVelocity(compliance_m_s_n=0.02, decay_cycles=4)
-    state = part.begun(np.array([0.0, 10.0, 0.0]))
+    state = part.begin(np.array([0.0, 10.0, 0.0]))
     speeds, active = [], []
     for _ in range(6):
         speeds.append(state.decayed(4)[1])

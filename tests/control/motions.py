@@ -37,9 +37,9 @@ class Mover:
         put_robot(now.part("robot", Report), robot)
         now.fill("kin", kin)
         now.put("ee", kin.position[controller.model.ee])
-        for room, part in zip(now.part("seen.near", Obstacles), obstacles, strict=True):
+        for room, part in zip(now.part("scene.near", Obstacles), obstacles, strict=True):
             room[: len(part)] = part
-        now.put("seen.all", len(obstacles.unit))
+        now.put("scene.total", len(obstacles.unit))
         now.put("request.velocity", velocity)
         now.put("request.goal", goal)
         now.put("request.hold", hold)

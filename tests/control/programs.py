@@ -4,8 +4,7 @@ import numpy as np
 from tests.reference.qp import Problem
 
 from pretouch.control.active_set import minimise_within
-from pretouch.control.penalty import Minimum, minimise
-from pretouch.control.penalty import Problem as Program
+from pretouch.control.penalty import Minimum, QuadraticProgram, minimise
 from pretouch.control.task import cost_into
 from pretouch.modes import outcome_of
 from pretouch.params import TaskParams
@@ -19,7 +18,7 @@ def answered(p: Problem, budget: int = 500) -> QpSolution:
     n, count, weight = len(p.f), len(p.h), p.weight or 0.0
     least = Minimum(np.zeros(n), np.zeros(count), np.zeros(n + count))
     solver = minimise if weight else minimise_within
-    ending = solver(Program(p.H, p.f, p.lower, p.upper, p.G, p.h, weight), budget, least)
+    ending = solver(QuadraticProgram(p.H, p.f, p.lower, p.upper, p.G, p.h, weight), budget, least)
     return QpSolution(*least, *outcome_of(False, ending, weight > 0.0 and bool(least.slack.max(initial=0.0) > 0.0)))
 
 

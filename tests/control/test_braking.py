@@ -58,7 +58,7 @@ class Sled:
         )  # fmt: skip
         chain = Chain(self.anchor, self.axis, self.moved_by, np.array([speed / 1000.0]))
         p, light = self.numbers, np.empty((0, 0))
-        rows = braking_rows(p, self.slots, obstacles, chain, light, p.touch, 0.0, self.untouched)
+        rows = braking_rows(p, self.slots, obstacles, chain, light, (p.touch, 0.0, self.untouched))
         return len(rows.which), rows.G[:, 0] / 1000.0, rows.h
 
 

@@ -132,7 +132,7 @@ def test_on_a_blocked_path_the_phase_waits(panda_model: RobotModel, paper_skin: 
     step = arm.run(200, seen={LEFT: 0.0})[-1]
     assert step.mode is Mode.TRACK
     assert step.path_phase - begun < 0.15
-    assert arm.run(100)[-1].reason == "Moving as asked."
+    assert arm.run(100)[-1].reason == "Moving as requested."
 
 
 def test_the_null_space_moves_the_elbow_away_and_the_hand_stays(panda_model: RobotModel):

@@ -8,14 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
 
-from pretouch.control.path import Pace, reduce_speed, speed_scale
+from pretouch.control.path import PathPace, reduce_speed, speed_scale
 
 D_MAX = 0.8
 
 
-def pace_of(scale: float, cycles: int) -> Pace:
+def pace_of(scale: float, cycles: int) -> PathPace:
     """What is remembered some cycles after the factor was `scale`."""
-    return Pace(np.full(1, scale), np.full(1, cycles), np.zeros(1), np.zeros(1))
+    return PathPace(np.full(1, scale), np.full(1, cycles), np.zeros(1), np.zeros(1))
 
 
 def faded(fresh: list[float]) -> list[float]:

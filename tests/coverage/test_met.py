@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pretouch.coverage.measure import Setting, covered
+from pretouch.coverage.measure import CoverageSetting, covered
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.ways import seen_by, ways_met
 from pretouch.perception.scene_filter import no_fixtures
@@ -78,7 +78,7 @@ def test_a_unit_at_the_hands_side_sees_what_that_side_meets(panda_model, surface
 
 def test_a_skin_is_measured_along_its_path_or_in_any_direction(panda_model, paper_skin):
     for workspace in ("circle", "joints"):
-        setting = Setting(panda_model, ROOM, PARAMS, workspace, 6, 3)
+        setting = CoverageSetting(panda_model, ROOM, PARAMS, workspace, 6, 3)
         met = setting.met()
         tip = np.flatnonzero(panda_model.moved_by.all(axis=1)[met.surface.link])
         fast = met.way[:, tip][met.free[:, tip]]

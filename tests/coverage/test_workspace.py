@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pretouch.coverage.figure import coverage_figure
-from pretouch.coverage.measure import Setting, covered, postures
+from pretouch.coverage.measure import CoverageSetting, covered, postures
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.ways import seen_by
 from pretouch.errors import ExperimentError
@@ -48,7 +48,7 @@ def test_one_posture_is_none_of_a_workspace(panda_model):
 
 
 def test_the_same_seed_gives_the_same_numbers_and_the_figure_can_be_drawn(panda_model, paper_skin):
-    setting = Setting(panda_model, ROOM, CoverageParams(), "circle", 4, 1000)
+    setting = CoverageSetting(panda_model, ROOM, CoverageParams(), "circle", 4, 1000)
     one, other, fresh = (covered(ways, seen_by(ways, paper_skin)) for ways in map(setting.ways, (0, 0, 1)))
     assert one.links == other.links
     assert fresh.arm.ways != one.arm.ways

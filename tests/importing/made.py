@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from pretouch.coverage.measure import Setting
+from pretouch.coverage.measure import CoverageSetting
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import suggest
 from pretouch.perception.scene_filter import floor_and_pedestal
@@ -63,6 +63,6 @@ def written(folder: Path, text: str, name: str = "arm.urdf") -> Path:
 def equipped(folder: Path, units: int = 8) -> Path:
     """Put a skin of suggested units into the folder of an imported arm."""
     model = RobotModel(load_description(folder))
-    ways = Setting(model, floor_and_pedestal(-0.2), CoverageParams(), "joints", 4).ways()
+    ways = CoverageSetting(model, floor_and_pedestal(-0.2), CoverageParams(), "joints", 4).ways()
     save_skin(Skin(suggest((ways,), Skin([], model), units).units, model), folder / OWN_SKIN)
     return folder

@@ -82,14 +82,14 @@ def test_the_sentence_names_unit_and_link_that_limit_what_is_asked():
     simulation, sentence = approaching(np.array([0.0, 0.42, 0.05]), np.array([0.0, 0.3, 0.0]))
     assert simulation.skin.ids[simulation.frame.step.limited.unit] == "hand_left"
     assert "hand_left sees something at 0." in sentence
-    assert "Asked 0.30 m/s, allowed 0." in sentence
+    assert "Requested 0.30 m/s, allowed 0." in sentence
     assert sentence.endswith(" m/s near panda_hand.")
 
 
 def test_an_arm_at_the_end_of_its_reach_one_at_a_joint_limit_and_one_without_units_say_what_limits_them(simulation):
     step, way, links = simulation.frame.step, np.array([0.0, 0.2, 0.0]), simulation.model.links
     assert step.limited.by is Limit.NOTHING
-    halved = " Asked 0.20 m/s, allowed 0.10 m/s"
+    halved = " Requested 0.20 m/s, allowed 0.10 m/s"
     sentence = explain(step, simulation.skin.ids, links, (way, 0.5 * way)).sentence
     assert sentence.endswith(f"{halved}: this posture allows no more.")
     qp = replace(step.qp, multipliers=np.eye(len(step.qp.multipliers))[3])
@@ -108,4 +108,4 @@ def test_the_page_of_a_blind_arm_knows_no_unit_in_use():
 
 def test_what_is_allowed_in_full_needs_no_reason_and_rest_is_named():
     assert approaching(np.array([0.5, 0.5, 0.5]), np.array([0.0, -0.1, 0.0]))[1].endswith("allowed 0.10 m/s.")
-    assert approaching(np.array([0.5, 0.5, 0.5]), np.zeros(3))[1].endswith(" No motion is asked.")
+    assert approaching(np.array([0.5, 0.5, 0.5]), np.zeros(3))[1].endswith(" No motion is requested.")

@@ -189,7 +189,7 @@ def test_a_person_drives_the_arm_at_another_by_target(tmp_path, pages):
         visitor.open(served)
         visitor.choose("Task", "drive yourself")
         visitor.press("Pause")
-        visitor.wait_for("reason", "No motion is asked.")
+        visitor.wait_for("reason", "No motion is requested.")
         visitor.wait_until(lambda: float(np.abs(simulation.frame.step.command).max()) < 0.03)
         start = simulation.frame.step.ee_position
         simulation.move_hand(start + np.array([0.0, 0.45, 0.05]))

@@ -126,8 +126,7 @@ def arm_and_ball():
 
 
 @given(
-    fraction=arrays(np.float64, 7, elements=st.floats(0, 1)),
-    point=arrays(np.float64, 3, elements=st.floats(-0.8, 1.0)),
+    fraction=arrays(np.float64, 7, elements=st.floats(0, 1)), point=arrays(np.float64, 3, elements=st.floats(-0.8, 1.0))
 )
 def test_distance_to_the_arm_is_that_of_mujoco(panda_model, arm_and_ball, fraction, point):
     model, data = arm_and_ball

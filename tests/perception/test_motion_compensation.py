@@ -29,7 +29,7 @@ def followed(distance, stamps=None, memory=MEMORY) -> list[float]:
         point, stamp = d * TOWARDS_ME[None], np.array([t])
         follow_points(tracks, point, stamp, np.ones(1, np.bool_), memory)
         closing_speeds(tracks.motion, near)
-        tracks = tracks._replace(point=point, seen=stamp)
+        tracks = tracks._replace(point=point, point_stamp=stamp)
         found.append(float(near.closing_speed[0]))
     return found
 
@@ -72,7 +72,7 @@ def test_after_a_silence_it_begins_anew():
 
 
 def test_readings_that_are_not_taken_change_nothing():
-    tracks = track_init(2)._replace(seen=np.zeros(2))
+    tracks = track_init(2)._replace(point_stamp=np.zeros(2))
     follow_points(tracks, np.ones((2, 3)), np.ones(2), np.array([True, False]), MEMORY)
     np.testing.assert_array_equal(tracks.motion[:, 0], [[1, 1, 1], [0, 0, 0]])
     assert np.isnan(tracks.motion[:, 1]).all()
@@ -93,7 +93,7 @@ def reckoned(distance: float, last: float | None, sensor: float = 0.0, velocity:
     before = np.full((1, 3), np.nan) if last is None else last * TOWARDS_ME[None]
     stamp = np.array([-np.inf if last is None else 1.0 - age])
     reckon(
-        points, np.array([distance]), np.ones(1), tracks._replace(point=before, seen=stamp),
+        points, np.array([distance]), np.ones(1), tracks._replace(point=before, point_stamp=stamp),
         Sensors(sensor * TOWARDS_ME[None], np.eye(3)[None], np.zeros(1, np.int64)), cones_of([PAPER_SENSOR]), 0.18,
     )  # fmt: skip
     return float(points[0, 2] - sensor)

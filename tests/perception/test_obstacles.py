@@ -5,13 +5,13 @@ from hypothesis import strategies as st
 
 from pretouch.perception.obstacles import (
     TrackState,
+    is_informative,
     locate,
     measured,
     newer,
     points_of_units,
-    take_in,
-    tells_anything,
     track_init,
+    update_tracks,
 )
 from pretouch.sensing.sensor import PAPER_SENSOR, cones_of
 from pretouch.types import RangeStatus, no_obstacles
@@ -29,10 +29,9 @@ def _reading(distance, status) -> tuple[np.ndarray, np.ndarray]:
 def track(
     state: TrackState, stamps: list[float], points: np.ndarray, shows: np.ndarray, tells: np.ndarray, now: float
 ) -> TrackState:
-    """The state with readings of these stamps taken in; a point is given up after 0.06 s."""
-    after, stamp = state._replace(point=state.point.copy(), seen=state.seen.copy()), np.array(stamps)
-    after = after._replace(used=state.used.copy(), heard=state.heard.copy())
-    take_in(after, stamp, points, newer(state.used, stamp, now), shows, tells, now, 0.06)
+    """The state after readings of these stamps; a point is dropped after 0.06 s."""
+    after, stamp = TrackState._make(part.copy() for part in state), np.array(stamps)
+    update_tracks(after, stamp, points, (newer(state.reading_stamp, stamp, now), shows, tells), now, 0.06)
     return after
 
 
@@ -79,7 +78,7 @@ def test_a_good_reading_is_taken_within_what_the_sensor_can_measure(distance, sh
 
 def _tells(status, distance) -> bool:
     readings = _reading(distance, status)
-    (tells,) = tells_anything(*readings, measured(*readings, ONE), ONE)
+    (tells,) = is_informative(*readings, measured(*readings, ONE), ONE)
     return bool(tells)
 
 
@@ -108,7 +107,7 @@ HIT, MISS, FAILURE = (True, True), (False, True), (False, False)
         ([(10.02, 10.0, HIT), (10.02, 10.02, HIT)], 10.02, 10.02, 10.02),
         # one that comes too late is used up but shows nothing
         ([(10.0, 10.07, HIT)], -INF, 10.0, 10.0),
-        # a failure is used up, but the unit is not heard
+        # a failure is used up, but is no report
         ([(10.0, 10.0, HIT), (10.02, 10.02, FAILURE)], 10.0, 10.02, 10.0),
         ([(10.0, 10.0, HIT), (10.02, 10.02, FAILURE), (10.04, 10.05, MISS)], 10.0, 10.04, 10.04),
     ],
@@ -117,7 +116,7 @@ def test_what_is_remembered_of_a_unit_after_readings(readings, seen, used, heard
     state = track_init(1)
     for stamp, now, (shows, tells) in readings:
         state = _take(state, stamp, now, x=stamp, shows=shows, tells=tells)  # the point tells its stamp
-    assert (state.seen, state.used, state.heard) == (seen, used, heard)
+    assert (state.point_stamp, state.reading_stamp, state.report_stamp) == (seen, used, heard)
     np.testing.assert_array_equal(state.point, [[NAN] * 3 if seen == -INF else [seen, 0.0, 0.0]])
 
 
@@ -126,17 +125,14 @@ def test_units_are_kept_apart():
     shows, tells = np.array([True, False, False, True]), np.array([True, True, False, True])
     state = track(track_init(4), [1.0, 1.0, 1.0, -INF], points, shows, tells, 1.0)
     np.testing.assert_array_equal(state.point, [[1, 0, 0], [NAN] * 3, [NAN] * 3, [NAN] * 3])
-    np.testing.assert_array_equal(state.seen, [1, -INF, -INF, -INF])
-    np.testing.assert_array_equal(state.heard, [1, 1, -INF, -INF])
-    np.testing.assert_array_equal(state.used, [1, 1, 1, -INF])
+    np.testing.assert_array_equal(state.point_stamp, [1, -INF, -INF, -INF])
+    np.testing.assert_array_equal(state.report_stamp, [1, 1, -INF, -INF])
+    np.testing.assert_array_equal(state.reading_stamp, [1, 1, 1, -INF])
 
 
 @given(
     messages=st.lists(
-        st.tuples(
-            st.integers(0, 30) | st.sampled_from([NAN, INF, -INF]),
-            st.sampled_from([HIT, MISS, FAILURE]),
-        ),
+        st.tuples(st.integers(0, 30) | st.sampled_from([NAN, INF, -INF]), st.sampled_from([HIT, MISS, FAILURE])),
         min_size=1,
         max_size=12,
     )
@@ -146,14 +142,14 @@ def test_a_track_holds_what_was_really_shown(messages):
     for tick, (at, (shows, tells)) in enumerate(messages):
         now, stamp = 0.02 * tick, 0.02 * at
         state = _take(state, stamp, now, x=stamp, shows=shows, tells=tells)  # the point tells its stamp
-        assert before <= state.used[0] <= now
-        assert state.seen[0] <= state.heard[0] <= state.used[0]
-        before = state.used[0]
-        if state.seen[0] > -INF:
-            assert state.point[0, 0] == state.seen[0]
-            assert any(shown and 0.02 * a == state.seen[0] for a, (shown, _) in messages[: tick + 1])
-        if state.heard[0] > -INF:
-            assert any(told and 0.02 * a == state.heard[0] for a, (_, told) in messages[: tick + 1])
+        assert before <= state.reading_stamp[0] <= now
+        assert state.point_stamp[0] <= state.report_stamp[0] <= state.reading_stamp[0]
+        before = state.reading_stamp[0]
+        if state.point_stamp[0] > -INF:
+            assert state.point[0, 0] == state.point_stamp[0]
+            assert any(shown and 0.02 * a == state.point_stamp[0] for a, (shown, _) in messages[: tick + 1])
+        if state.report_stamp[0] > -INF:
+            assert any(told and 0.02 * a == state.report_stamp[0] for a, (_, told) in messages[: tick + 1])
 
 
 def test_points_of_units_leave_out_those_of_other_sources():

@@ -38,7 +38,7 @@ class Watcher(Eyes):
 
     @property
     def heard(self):
-        return self.memory.get("outside.heard")
+        return self.memory.get("outside.source_stamp")
 
     def pose(self, q):
         self.q, self.kin = q, self.model.kinematics(q)
@@ -222,7 +222,7 @@ def test_a_set_from_the_future_or_from_before_is_not_heard(watcher):
 
 def test_a_source_that_falls_silent_slows_the_arm_and_stops_it(watcher):
     watcher.see(1.0, points_at(-np.inf))
-    assert outside_silence(watcher.heard, "", 1.0, POINTS) == (0.0, "has not been heard yet")
+    assert outside_silence(watcher.heard, "", 1.0, POINTS) == (0.0, "has not reported yet")
     watcher.see(1.0, points_at(1.0))
     assert outside_silence(watcher.heard, "", 1.2, POINTS) == (1.0, "")
     factor, lost = outside_silence(watcher.heard, "", 1.3, POINTS)

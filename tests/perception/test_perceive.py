@@ -113,8 +113,8 @@ def test_whatever_arrives_obstacles_are_whole(panda_model, paper_skin, steps):
         now = 1.0 + 0.05 * tick
         stamp, distance, status = (np.array(part) for part in zip(*step, strict=True))
         found = watcher.take(RangeReadings(stamp.astype(float), distance.astype(float), status.astype(np.int64)), now)
-        assert np.all(now - watcher.state.seen[found.unit] <= PARAMS.persistence_s)
-        assert np.all(watcher.state.seen[found.unit] <= now)
+        assert np.all(now - watcher.state.point_stamp[found.unit] <= PARAMS.persistence_s)
+        assert np.all(watcher.state.point_stamp[found.unit] <= now)
         for part in (found.point, found.body_point, found.direction, found.body_distance, found.ee_distance):
             assert np.all(np.isfinite(part))
         np.testing.assert_allclose(np.linalg.norm(found.direction, axis=1), 1.0, atol=1e-9)
@@ -129,8 +129,8 @@ def test_whatever_arrives_obstacles_are_whole(panda_model, paper_skin, steps):
 
 def _silent(watcher, now: float, status: RangeStatus = RangeStatus.OK) -> tuple[float, str]:
     reported = np.full(len(watcher.skin), int(status))
-    names = silent_units(watcher.skin, watcher.state.heard, reported, now, PARAMS.silent_after_s)
-    return watcher.now.get("seen.heard"), names
+    names = silent_units(watcher.skin, watcher.state.report_stamp, reported, now, PARAMS.silent_after_s)
+    return watcher.now.get("scene.silence_scale"), names
 
 
 def _go_on(watcher, start, duration=0.4, status=RangeStatus.OK, ahead=0.0) -> tuple[float, str]:

@@ -44,10 +44,7 @@ def test_the_spread_grows_with_the_distance_and_both_uncertainties():
 @pytest.mark.parametrize("filtered", [True, False])
 @given(distances=st.lists(st.floats(0.04, 1.0), min_size=7, max_size=7))
 def test_what_is_seen_counts_as_nearer_by_its_spread(panda_model, paper_skin, filtered, distances):
-    skin, params = (
-        unsure(paper_skin, panda_model, 0.01, 0.05),
-        PARAMS if filtered else BARE,
-    )
+    skin, params = (unsure(paper_skin, panda_model, 0.01, 0.05), PARAMS if filtered else BARE)
     watcher = Watcher(panda_model, skin, FLOOR, params)
     near = look(watcher, distances)
     exact = seen(panda_model, paper_skin, distances, params)
@@ -60,7 +57,7 @@ def test_what_is_seen_counts_as_nearer_by_its_spread(panda_model, paper_skin, fi
     np.testing.assert_allclose(near.body_distance, exact.body_distance[both] - u, atol=1e-12)
     ee_distance = np.maximum(exact.ee_distance[both] - u, 0.0)
     np.testing.assert_allclose(near.ee_distance, ee_distance, atol=1e-12)
-    assert watcher.now.get("seen.nearest") == near.ee_distance.min(initial=np.inf)
+    assert watcher.now.get("scene.nearest") == near.ee_distance.min(initial=np.inf)
 
 
 @given(distances=st.lists(st.floats(0.0, 5.0) | st.just(np.nan), min_size=7, max_size=7))
@@ -85,7 +82,7 @@ def test_a_distance_from_the_body_may_be_negative_that_from_the_hand_may_not(pan
     found = look(watcher, 0.1)
     assert (found.body_distance < 0).all()
     np.testing.assert_array_equal(found.ee_distance, 0.0)
-    assert watcher.now.get("seen.nearest") == 0.0
+    assert watcher.now.get("scene.nearest") == 0.0
     np.testing.assert_allclose(np.linalg.norm(found.direction, axis=1), 1.0, atol=1e-12)
 
 

@@ -62,7 +62,7 @@ class Watcher:
             blocks = self.controller.fixed.blocks, self.memory.blocks, self.now.blocks
             line_points(*blocks, points, self.controller.beside)
         self.controller.take(self.memory, self.now, beside or self.controller.beside, SEE, SEE)
-        return Obstacles._make(part[: self.now.get("seen.found")] for part in self.now.part("seen.near", Obstacles))
+        return Obstacles._make(part[: self.now.get("scene.sensed")] for part in self.now.part("scene.near", Obstacles))
 
     def see(self, now: float, status: RangeStatus = RangeStatus.OK, **distance: float) -> Obstacles:
         """Take new readings of the units that are named."""

@@ -106,7 +106,7 @@ def step(model, units=7, stamp=0.0, near=(), **changes):
     """One step at rest in the ready posture that sees and feels nothing."""
     n, zero = model.n, np.zeros(3)
     made = ControlStep(
-        stamp=stamp, mode=Mode.TRACK, event=Event.CLEAR, detail="", reason="Moving as asked.", latched=False,
+        stamp=stamp, mode=Mode.TRACK, event=Event.CLEAR, detail="", reason="Moving as requested.", latched=False,
         q=model.description.q_ready,
         q_commanded=model.description.q_ready, ee_position=np.array([0.5, 0.0, 0.5]), ee_velocity=zero,
         path_position=np.array([0.5, 0.0, 0.5]), path_phase=0.0, desired_velocity=zero, speed_scale=1.0,

@@ -18,7 +18,7 @@ def state(q, qd, stamp=2.0) -> RobotState:
 
 
 def test_before_its_first_state_it_is_somewhere(panda_model):
-    assert sound_moving(OtherArm(panda_model, T, lambda: None)(), 0.0, 0.05) == (None, "have not been told of yet")
+    assert sound_moving(OtherArm(panda_model, T, lambda: None)(), 0.0, 0.05) == (None, "have not been reported yet")
 
 
 def test_its_capsules_stand_in_the_frame_of_the_arm_beside_it(panda_model):

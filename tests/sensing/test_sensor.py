@@ -89,13 +89,16 @@ def test_a_reading_counts_within_what_its_own_sensor_measures():
     [
         (UNIT.format(id="a", z=0.0) + 'sensor = "radar9"\n', r"Unit a has the sensor 'radar9': choose from .*vl53l1x"),
         (UNIT.format(id="a", z=0.0) + "sensor = 7\n", "Unit a has the sensor 7: choose from"),
-        ("[sensor.odd]\nfield_of_view_deg = 400\n", r"\[sensor.odd\] cannot be: .*field_of_view_deg.* at most 120"),
-        ("[sensor.odd]\nnearest_m = 5.0\n", r"\[sensor.odd\] cannot be: .*nearest_m is 5 and farthest_m 4"),
-        ("[sensor.odd]\nrate_hz = nan\n", r"\[sensor.odd\] cannot be: .*rate_hz"),
+        (
+            "[sensor.odd]\nfield_of_view_deg = 400\n",
+            r"\[sensor.odd\] is not possible: .*field_of_view_deg.* at most 120",
+        ),
+        ("[sensor.odd]\nnearest_m = 5.0\n", r"\[sensor.odd\] is not possible: .*nearest_m is 5 and farthest_m 4"),
+        ("[sensor.odd]\nrate_hz = nan\n", r"\[sensor.odd\] is not possible: .*rate_hz"),
         ("[sensor.odd]\nangle = 3\n", r"\[sensor.odd\] has the unknown key 'angle': use like, field_of_view_deg"),
         ("[sensor.odd]\nown_name = 'x'\n", "has the unknown key 'own_name'"),
         ('[sensor.odd]\nlike = "odder"\n', r"\[sensor.odd\] has the sensor 'odder': choose from"),
-        ("[sensor.vl53l1x]\nrate_hz = 10\n", r"\[sensor.vl53l1x\] is known by that name already"),
+        ("[sensor.vl53l1x]\nrate_hz = 10\n", r"\[sensor.vl53l1x\] has the name of a known type"),
         (
             '[sensor.mine]\nlike = "vl53l5cx"\nzones = 5\n',
             r"zones is 5: it measures 4 x 4 or 8 x 8. \(in .*skin.toml\)",

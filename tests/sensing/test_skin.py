@@ -236,7 +236,10 @@ def test_a_rounded_quaternion_and_uncertainties_in_whole_numbers_are_taken(panda
         (_entry(orientation_sigma_rad="5"), "its orientation_sigma is 5.0: give a standard deviation from 0 to 1.571"),
         (_entry(touch='"yes"'), r"Unit left: Expected `bool \| object`, got `str` - at `\$.touch`"),
         (_entry(touch="{radius = 0.03}"), "Unit left: touch has the unknown key 'radius': use radius_m, force_min_n"),
-        (_entry(touch="{radius_m = 0.0}"), "Unit left: touch cannot be: .*radius_m is 0.0: it must be greater than 0"),
+        (
+            _entry(touch="{radius_m = 0.0}"),
+            "Unit left: touch is not possible: .*radius_m is 0.0: it must be greater than 0",
+        ),
         (_entry(touch="{radius_m = nan}"), "radius_m is nan: it must be finite"),
         (_entry(touch="{radius_m = 20}"), "radius_m is 20: it must be at most 0.2"),
         (_entry(touch="{force_min_n = true}"), "force_min_n is True: it must be a number"),

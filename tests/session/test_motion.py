@@ -61,7 +61,7 @@ class Keeper:
 def followed(controller, arm, keeper, cycles=80):
     ending = Ending()
     clock = MonotonicClock(0.01)
-    options = realtime.Options(tell=lambda _: None)
+    options = realtime.RealTimeOptions(tell=lambda _: None)
     standing = StandingArm(arm, NoUnits(), controller, 0.0, clock)
     follow(standing, clock, keeper, lambda _: len(keeper.steps) >= cycles, options, ending)
     return ending
@@ -129,7 +129,7 @@ def test_an_arm_whose_motion_cannot_be_ended_is_looked_at(controller, arm, stand
 def test_of_an_arm_that_is_lost_before_it_is_commanded_nothing_is_said_but_after_its_way_that_it_may_move(
     controller, arm
 ):
-    clock, options, ending = MonotonicClock(0.01), realtime.Options(tell=lambda _: None), Ending()
+    clock, options, ending = MonotonicClock(0.01), realtime.RealTimeOptions(tell=lambda _: None), Ending()
     standing, arm.gone = StandingArm(arm, NoUnits(), controller, 0.0, clock), True
     way = Plan(np.array([0.0, 0.2]), np.array([arm.q, arm.q]))
     execute(standing, way, 1.0, Keeper(), clock, options, ending)

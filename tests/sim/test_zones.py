@@ -65,4 +65,4 @@ def test_a_single_cone_does_not_see_it(rig):
 def test_a_silent_unit_is_named_once(panda_model, paper_skin):
     skin = Skin([replace(paper_skin.units[0], sensor=VL53L5CX())], panda_model)
     silent_after, status = profile("pretouch").perception.silent_after_s, np.full(len(skin), int(RangeStatus.NONE))
-    assert silent_units(skin, track_init(len(skin)).heard, status, 1.0, silent_after) == "hand_left"
+    assert silent_units(skin, track_init(len(skin)).report_stamp, status, 1.0, silent_after) == "hand_left"

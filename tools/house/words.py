@@ -19,16 +19,41 @@ NAMES = PARTICIPLES | {"gone", "heard", "judged", "meant", "met", "seen"}
 BEGINNINGS = frozenset({"Of", "What", "Whether", "Whom"})
 """First words of docstrings whose sentence has its noun late or nowhere."""
 
-NOT_YET = ("fci/", "lab/", "ros2/", "src/pretouch/")
+NOT_YET = (
+    "fci/",
+    "lab/",
+    "ros2/",
+    "src/pretouch/arms/",
+    "src/pretouch/calibration/",
+    "src/pretouch/cli/",
+    "src/pretouch/imported_data/",
+    "src/pretouch/importing/",
+    "src/pretouch/page/",
+    "src/pretouch/recording/",
+    "src/pretouch/reporting/",
+    "src/pretouch/session/",
+    "src/pretouch/sim/",
+    "src/pretouch/units/",
+)
 """Beginnings of the paths of files that have such words still. Only ever shortened."""
 
+STORED = frozenset(
+    {
+        ("src/pretouch/inputs.py", "heard"),
+        ("src/pretouch/contact/repeated_contact.py", "met"),
+        ("src/pretouch/contact/repeated_contact.py", "seen"),
+        ("src/pretouch/contact/residual_model.py", "seen"),
+    }
+)
+"""Fields whose names are in recordings and in files of models."""
 
-def hard_words(tree: ast.AST) -> Iterator[tuple[int, str]]:
-    """Yield line and sentence of each name and docstring to be written anew."""
+
+def hard_words(tree: ast.AST, allowed: frozenset[str] = frozenset()) -> Iterator[tuple[int, str]]:
+    """Yield line and sentence of each name, but for those allowed, and of each docstring to be written anew."""
     for node in ast.walk(tree):
         match node:
             case ast.Name(id=name, ctx=ast.Store()) | ast.arg(arg=name) | ast.Attribute(attr=name, ctx=ast.Store()):
-                if name.strip("_") in NAMES:
+                if name.strip("_") in NAMES - allowed:
                     yield node.lineno, f"{name} is a participle: name the value by a noun of the field"
             case ast.Expr(value=ast.Constant(value=str(text))):
                 first = text.partition(" ")[0]
@@ -42,7 +67,8 @@ def main(root: Path = ROOT, not_yet: tuple[str, ...] = NOT_YET) -> int:
     for path in sorted(path for folder in _FOLDERS for path in (root / folder).rglob("*.py")):
         name = path.relative_to(root).as_posix()
         if not name.startswith(not_yet):
-            words = hard_words(ast.parse(path.read_text(encoding="utf-8")))
+            stored = frozenset(field for file, field in STORED if file == name)
+            words = hard_words(ast.parse(path.read_text(encoding="utf-8")), stored)
             places += [f"{name}:{line}: {sentence}" for line, sentence in words]
     print(*places, sep="\n", end="\n" if places else "")
     return int(bool(places))

@@ -18,5 +18,5 @@ def test_a_program_of_the_vendors_library_yields_to_a_push_and_goes_on(serve):
     contacts = [float(at) for at, reason in told if "contact" in reason]
     assert contacts, ended.stdout
     assert 3.0 <= contacts[0] <= 3.1  # pushed 3 s after the motion began
-    assert told[-1][1] == "Moving as asked."
+    assert told[-1][1] == "Moving as requested."
     assert "at rest after 6" in ended.stdout

@@ -170,7 +170,7 @@ class Simulation:
         believed = setup.skin if parts.believed is None else parts.believed
         self.controller = setup.controller(model, believed, fixtures(scene), setup.path, setup.profile)
         self.clock = PlantClock(self.plant, setup.profile.task.control_period_s)
-        self.skin: ports.Skin = units
+        self.skin: ports.SkinPort = units
         if len(setup.skin.touching):
             touch = TouchSensors(self.plant, setup.skin, TouchErrors(), setup.seed)
             self.skin = SimulatedTouchSkin(units.read, touch.touch)

@@ -16,7 +16,7 @@ def step(i, **changed):
     """A control step at 100 Hz, in which nothing happens."""
     usual = dict.fromkeys(("ee_position", "path_position", "force", "reaction_velocity"), np.zeros(3))
     usual |= dict.fromkeys(("q", "command"), np.zeros(7))
-    usual |= {"stamp": 0.01 * i, "mode": Mode.TRACK, "reason": "Moving as asked.", "path_phase": 0.0, "contact": None}
+    usual |= {"stamp": 0.01 * i, "mode": Mode.TRACK, "reason": "As requested.", "path_phase": 0.0, "contact": None}
     return SimpleNamespace(**usual | changed)
 
 

@@ -56,7 +56,7 @@ def run(capsys, *args):
         ("bench cycle --cycles 0", "The number of cycles is 0"),
         ("bench cycle --profile brave", "The profile 'brave' is unknown"),
         ("bench cycle --priority 100", "The real-time priority is 100: give 1 to 99"),
-        ("bench cycle --cpu -1", "Processor -1 is none this process may use: choose from"),
+        ("bench cycle --cpu -1", "Processor -1 is not available to this process: choose from"),
         ("bench cycle --json /dev/null/x.json", "/dev/null/x.json cannot be written"),
         ("bench calibration --skins 0", "The number of skins is 0"),
         ("bench calibration --seed -1", "The seed is -1: it must be at least 0"),

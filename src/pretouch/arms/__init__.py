@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pretouch.controller import Controller
     from pretouch.desired import Desired
     from pretouch.loop import Cycle
-    from pretouch.ports import Arm, Skin
+    from pretouch.ports import Arm, SkinPort
     from pretouch.profiles import Profile
     from pretouch.robot.description import RobotDescription
     from pretouch.robot.model import RobotModel
@@ -81,7 +81,7 @@ class OpenedArm:
     arm: "Arm"
     identity: "Identity | None" = None
     """Identity by which its confirmed force sign is remembered; None: it is not remembered."""
-    skin: "Skin | None" = None
+    skin: "SkinPort | None" = None
     """Its sensor units, a `NetworkSkin` where their health is to be judged; None: it brings none."""
     push: "Callable[[Direction], None]" = lambda _: None
     """Called as a person is asked to push: a simulated one does."""

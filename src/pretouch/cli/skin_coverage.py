@@ -13,7 +13,7 @@ from pretouch.cli.tables import show
 from pretouch.cli.writing import check_outputs, numbers_to, unwritable_said
 from pretouch.coverage import measure
 from pretouch.coverage.blind import BLIND, blind_spots
-from pretouch.coverage.measure import Setting, covered
+from pretouch.coverage.measure import CoverageSetting, covered
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import Suggestions, candidates, suggest
 from pretouch.coverage.ways import Ways, seen_by
@@ -73,7 +73,7 @@ class MeasureCoverage:
         skin = load_skin(source, model) if source else Skin([], model)
         self._check_outputs(source)
         fixed = floor_and_pedestal(self.floor)
-        setting = Setting(model, fixed, self.approach, self.workspace, self.postures, self.seed)
+        setting = CoverageSetting(model, fixed, self.approach, self.workspace, self.postures, self.seed)
         with numbers_to(self.json) as write:
             write({"asked": self} | _measured(self, setting, skin))
 
@@ -96,7 +96,7 @@ class MeasureCoverage:
         check_outputs([("skin file", self.out), ("figure", self.figure), ("file", self.json)], [source], self.replace)
 
 
-def _measured(command: MeasureCoverage, setting: Setting, skin: Skin) -> dict[str, Any]:
+def _measured(command: MeasureCoverage, setting: CoverageSetting, skin: Skin) -> dict[str, Any]:
     """Measure, print and draw; return the numbers."""
     ways, standing = setting.ways(), setting.met()
     console = Console(highlight=False)
@@ -142,7 +142,7 @@ def _numbers(coming: measure.Coverage, standing: measure.Coverage) -> dict[str, 
     return {"links": (*coming.links, coming.arm), "met": (*standing.links, standing.arm)}
 
 
-def _link_table(setting: Setting, coming: measure.Coverage, standing: measure.Coverage) -> TextTable:
+def _link_table(setting: CoverageSetting, coming: measure.Coverage, standing: measure.Coverage) -> TextTable:
     """Show the shares of each link and of the arm."""
     p, meets = setting.params, {one.name: one.ways for one in (*standing.links, standing.arm)}
     columns = (

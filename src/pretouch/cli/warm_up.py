@@ -78,7 +78,7 @@ def prepare(chosen: Profile) -> None:
 
 def _detect(controller: Controller, robot: RobotState) -> None:
     """Tell free motion and a contact, and where it is."""
-    state, near = controller.init(robot), controller.blank.part("seen.near", Obstacles)
+    state, near = controller.init(robot), controller.blank.part("scene.near", Obstacles)
     kin, memory = controller.model.kinematics(robot.q), controller.whole_detector(state)
     for push in (0.0, _PUSH_NM):
         report = replace(robot, tau_ext=np.full(len(robot.q), push))

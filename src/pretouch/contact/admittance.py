@@ -1,4 +1,4 @@
-"""Yielding to a push as long as it lasts: the admittance, with clamps and places where the arm gives up."""
+"""Reaction that yields to a push as long as it lasts: the admittance, with clamps, pinches and giving up."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -7,23 +7,23 @@ import numpy as np
 
 from pretouch.contact.clamp import (
     ClampState,
-    caught_between,
+    begin_pinch,
     clamp_init,
-    clamped,
-    find_self_clamp,
+    find_pinch,
     note_place,
-    opened,
+    open_clamp,
     presses_on_fixture,
+    update_clamp,
 )
 from pretouch.contact.detector import Body
 from pretouch.contact.reaction import Reaction, ReactionInputs, ReactionMotion, contact_event, new_contact
 from pretouch.contact.repeated_contact import (
-    Met,
+    PathContact,
     RepeatedContactState,
+    add_contact,
     discount_push,
     forget_passed,
-    given_up,
-    meet,
+    is_given_up,
     repeated_contact_init,
     wait_to_retry,
 )
@@ -46,7 +46,7 @@ from pretouch.types import FloatArray, Mode
 from pretouch.values import value
 
 Doing = Literal["task", "learn", "react", "soft", "still"]
-"""What the arm does: follow its task or stand with its window filling (`learn`), react, hold softly, hold still."""
+"""Behaviour of the arm: follow the task, stand while the window fills (`learn`), react, hold softly, hold still."""
 
 
 @value
@@ -56,9 +56,9 @@ class AdmittanceState:
     clamp: ClampState
     place: RepeatedContactState
     origin: FloatArray | None = None
-    """(2, C, 3) where the ends of the body's axes were when the reaction began [m], None before any."""
+    """(2, C, 3) ends of the body's axes at the start of the reaction [m], None before the first."""
     moved: float = 0.0
-    """How far the farthest of them has come since [m]."""
+    """Largest distance of these ends from there [m]."""
 
 
 @dataclass(frozen=True)
@@ -75,24 +75,24 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
     def sense(
         self, state: AdmittanceState, body: Body, inputs: ReactionInputs
     ) -> tuple[dict[Event, str], AdmittanceState]:
-        """Let the virtual mass move, look for clamps, count places; name what the reaction is at."""
+        """Move the virtual mass, look for clamps, count contacts; return the events of the reaction."""
         doing, near = self._doing(inputs.mode, inputs.detection.armed), self._near(inputs)
         mass, clamp, moved, q, dt = inputs.mass, state.clamp, 0.0, inputs.robot.q_commanded, body.period
         self._move_mass(clamp, doing, body, inputs)
         if doing == "react" and state.origin is not None:
-            # a soft hold has no such bound: who frees somebody, or guides the arm out, may have to move it farther
+            # a soft hold has no such bound: a person who frees somebody, or guides the arm out, may move it farther
             mass.velocity[:], moved = within_reach(_axes(body, inputs.kin), mass.velocity, state.origin, self.reach_m)
-        # a clamp that is found stands: the arm opens out of it, and no other is looked for
+        # a detected clamp stays: the arm opens out of it, without a search for others
         if doing == "react" and not clamp.torque:
             if self.clamp is not None:
-                clamp = clamped(clamp, mass.torque, mass.velocity, q, dt, self.clamp)
-            clamp = self._pinched(clamp, body, inputs)
+                clamp = update_clamp(clamp, mass.torque, mass.velocity, q, dt, self.clamp)
+            clamp = self._find_pinch(clamp, body, inputs)
         elif doing == "task" and self.pinch is not None:
             note_place(mass.path, mass.marked, q, dt)
         if inputs.resume:
             clamp, mass.path[:], mass.marked[0] = clamp_init(q), q, 0.0
-        # what the tank holds beyond its start is the least energy that the contact has given
-        place = self._placed(state.place, doing, mass.tank[0] - self.start_energy_j, near, dt, inputs)
+        # the energy in the tank beyond its start is the least that the contact has given
+        place = self._update_place(state.place, doing, mass.tank[0] - self.start_energy_j, near, dt, inputs)
         state = AdmittanceState(clamp, place, state.origin, moved)
         return self._events(state, doing, near, inputs), state
 
@@ -101,38 +101,38 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
     ) -> tuple[ReactionMotion | None, AdmittanceState]:
         """Return the joint velocities of the virtual mass, or of the opening of a clamp."""
         if new_contact(inputs, mode) is not None:
-            state = self._begun(state, body, inputs)
+            state = self._begin(state, body, inputs)
         doing = self._doing(mode, inputs.detection.armed)
         if doing not in ("react", "soft"):
             return None, state
         qd, kin = inputs.mass.velocity.copy(), inputs.kin
         opens = doing == "react" and state.clamp.torque > 0 and not state.clamp.open
         if opens:
-            # also what is caught between links, where no other clamp is looked for
+            # also for a pinch, where the search for other clamps is off
             p = self.clamp or ClampParams()
-            back, clamp = opened(state.clamp, inputs.mass.torque, inputs.robot.q_commanded, body.period, p)
+            back, clamp = open_clamp(state.clamp, inputs.mass.torque, inputs.robot.q_commanded, body.period, p)
             fastest = fastest_point(_axes(body, kin), back)
             qd = back * min(1.0, p.open_m_s / fastest) if fastest > 0 else back  # never beyond the place in one period
             state, inputs.mass.velocity[:] = replace(state, clamp=clamp), 0.0
         if doing == "soft" and not qd.any():
             return None, state
-        # a pushed arm touches nothing that it sees; one that is caught is between two objects, and must get out
+        # a pushed arm touches no obstacle; a clamped one is between two objects, and must get out
         touch_speed = (self.clamp or ClampParams()).open_m_s if opens else 0.0
         return ReactionMotion(body.model.ee_jacobian(kin)[:3] @ qd, qd, touch_speed), state
 
     def is_over(self, state: AdmittanceState) -> bool:
-        """Whether there is neither a clamp nor a place given up."""
+        """Return whether there is neither a clamp nor a location with contacts."""
         return not state.clamp.torque and not state.place.contacts
 
     def announced(self, period: float) -> str:
-        """Say how fast the arm goes with a push, and when it goes on."""
+        """Say how fast the arm moves with a push, and when its task continues."""
         return (
             f"When pushed, it yields at up to {self.speed_max_m_s:g} m/s as long as the push lasts, by up to"
             f" {self.reach_m:g} m, and continues {self.quiet_s:g} s later: keep everything it could hit away from it."
         )
 
     def _doing(self, mode: ModeState, armed: bool) -> Doing:
-        """What the arm does in a mode, as far as contacts matter."""
+        """Return the behaviour of the arm in a mode, as far as contacts matter."""
         if mode.mode is Mode.REACT:
             return "react"
         if mode.mode is Mode.TRACK:
@@ -140,7 +140,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         return "learn" if not armed else "soft" if mode.soft and self.soft_hold else "still"
 
     def _near(self, inputs: ReactionInputs) -> bool:
-        """Whether something is seen near the body, or may be missed."""
+        """Return whether an obstacle is near the body, or may be missed."""
         return inputs.unseen or any(distance < self.near_m for distance in inputs.obstacles.body_distance.tolist())
 
     def _move_mass(self, clamp: ClampState, doing: Doing, body: Body, inputs: ReactionInputs) -> None:
@@ -155,31 +155,31 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
             contact = detection.evidence >= 1.0
             yield_to(mass, residual, inputs.command, band, axes, self.numbers, body.period, contact)
             if doing == "soft" and clamp.torque:
-                # out of the clamp it may be moved, not back into it
+                # it may be moved out of the clamp, not back into it
                 mass.velocity[mass.velocity * clamp.course > 0] = 0.0
 
-    def _placed(
+    def _update_place(
         self, place: RepeatedContactState, doing: Doing, energy: float, near: bool, dt: float, inputs: ReactionInputs
     ) -> RepeatedContactState:
-        """Judge the contact under way by its energy [J], wait at a place given up, or forget one that is passed."""
+        """Judge the present contact by its energy [J], wait at a location given up, or forget one behind the arm."""
         if inputs.resume:
             return repeated_contact_init()
         if self.give_up is None:
             return place
         if doing == "react":
             return discount_push(place, energy)
-        if given_up(place, self.give_up):
+        if is_given_up(place, self.give_up):
             return wait_to_retry(place, near, dt, self.give_up)
         return forget_passed(place, inputs.path_phase, inputs.robot.q) if doing == "task" else place
 
-    def _begun(self, state: AdmittanceState, body: Body, inputs: ReactionInputs) -> AdmittanceState:
-        """Begin to move with the contact that was found; one the arm brought about in its task counts for its place."""
+    def _begin(self, state: AdmittanceState, body: Body, inputs: ReactionInputs) -> AdmittanceState:
+        """Begin to move with a detected contact; one that the arm caused in its task counts for its location."""
         model, kin, command = body.model, inputs.kin, inputs.command
         doing = self._doing(inputs.mode, inputs.detection.armed)
         torque = _residual(inputs) - inputs.mass.mean[1]
         band = dead_band(model.description.tau_max, self)
-        # The torque before the onset: the last sample, or in a soft hold the filtered torque. A stiff hold remembers
-        # none, and the sample stands for itself.
+        # The torque before the onset: the last sample, or in a soft hold the filtered torque. A stiff hold has none:
+        # there the sample itself counts.
         before = {"soft": inputs.mass.steady[0], "still": torque}.get(doing, inputs.mass.torque)
         begin(inputs.mass, _axes(body, kin), torque, before, band, self)
         place, contact = state.place, None
@@ -188,48 +188,49 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         if contact is not None and self.give_up is not None:
             q, force = inputs.robot.q, float(np.linalg.norm(contact.force))
             kinetic = 0.5 * float(command @ model.mass_matrix(q) @ command)
-            met = Met(inputs.path_phase, kin.position[model.ee], q, torque / max(force, _LEAST_N), command, kinetic)
-            place = meet(place, met, self._near(inputs), self.give_up)
+            lever = torque / max(force, _LEAST_N)
+            collision = PathContact(inputs.path_phase, kin.position[model.ee], q, lever, command, kinetic)
+            place = add_contact(place, collision, self._near(inputs), self.give_up)
         else:
             place = replace(place, counted=False)
-        # only the arm's own task closes a gap on something: without a motion there is no self-clamping to be found
+        # only the task closes a gap on something: without such a motion there is no pinch
         came = command if doing == "task" else np.zeros(len(torque))
-        clamp = self._pinched(replace(clamp_init(inputs.robot.q_commanded), came=came), body, inputs)
+        clamp = self._find_pinch(replace(clamp_init(inputs.robot.q_commanded), came=came), body, inputs)
         return AdmittanceState(clamp, place, np.array(placed(model.body, kin)[1:3]), 0.0)
 
-    def _pinched(self, clamp: ClampState, body: Body, inputs: ReactionInputs) -> ClampState:
-        """Look for something caught between two links, or one and a fixture, as long as a contact is detected."""
+    def _find_pinch(self, clamp: ClampState, body: Body, inputs: ReactionInputs) -> ClampState:
+        """Look for a pinch between two links, or a link and a fixture, as long as a contact is detected."""
         p, significant, touched = self.pinch, inputs.detection.significant, inputs.detection.touched
         if p is None or clamp.torque or significant is None:
             return clamp
         (torque, covariance), names = significant, body.model.links
-        pinch = find_self_clamp(body.model, inputs.kin, torque, covariance, clamp.came, p)
+        pinch = find_pinch(body.model, inputs.kin, torque, covariance, clamp.came, p)
         if pinch is not None:
             one, other, force = pinch
-            return caught_between(clamp, inputs.mass.path, f"{names[one]} and {names[other]}", force, torque)
+            return begin_pinch(clamp, inputs.mass.path, f"{names[one]} and {names[other]}", force, torque)
         if presses_on_fixture(body, inputs.kin, touched, clamp.came, p):
             force = float(np.linalg.norm(touched.force[0]))
-            return caught_between(clamp, inputs.mass.path, f"{names[touched.link[0]]} and a fixture", force, torque)
+            return begin_pinch(clamp, inputs.mass.path, f"{names[touched.link[0]]} and a fixture", force, torque)
         return clamp
 
     def _events(self, state: AdmittanceState, doing: Doing, near: bool, inputs: ReactionInputs) -> dict[Event, str]:
-        """Name a contact that moves the arm, what the reaction is at, and what the arm gave up."""
+        """Return the events: a contact that moves the arm, the state of the reaction, and a location given up."""
         mass, clamp, place = inputs.mass, state.clamp, state.place
         # an arm that holds softly sticks to static friction
         sticks = doing == "soft" and self.static_friction_nm > 0 and not mass.sliding.any()
         events = {} if sticks else contact_event(inputs.detection)
-        # one of these at most, the first that holds; giving up is reported beside it
+        # at most one of these, the first that applies; giving up is reported beside it
         if clamp.torque:
-            events[Event.CLAMPED if clamp.open else Event.OPENING] = _caught(clamp)
+            events[Event.CLAMPED if clamp.open else Event.OPENING] = _clamp_detail(clamp)
         elif doing == "react" and self._waits(state.place, near, inputs):
-            until = ", once nothing is seen near it" if near and not given_up(place, self.give_up) else ""
+            until = ", once nothing is seen near it" if near and not is_given_up(place, self.give_up) else ""
             at_reach = state.moved > _FAR * self.reach_m
-            far = f"; it is {state.moved:.2f} m away, and goes no farther" if at_reach else ""
+            far = f"; it is {state.moved:.2f} m away, and moves no farther" if at_reach else ""
             events[Event.YIELDING] = f"{self.quiet_s:g} s after the last push{until}{far}"
         elif doing in ("react", "soft") and self._presses(mass) and mass.quiet[0] >= max(self.quiet_s, self.patience_s):
             torque = np.abs(mass.steady[1])
             events[Event.PRESSED] = f"{self.patience_s:g} s, about {torque.max():.0f} Nm at joint {torque.argmax() + 1}"
-        if self.give_up is not None and place.met is not None and given_up(place, self.give_up):
+        if self.give_up is not None and place.met is not None and is_given_up(place, self.give_up):
             x, y, z = place.met.point
             when = f"{self.give_up.retry_s:g} s have passed"
             when = f"nothing is seen within {self.near_m:g} m of it" if place.seen else when
@@ -240,17 +241,17 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         return events
 
     def _waits(self, place: RepeatedContactState, near: bool, inputs: ReactionInputs) -> bool:
-        """Whether the arm still yields, or waits for more of the push, or for what presses or is near to go.
+        """Return whether the arm still yields, or waits for more of the push, or for a force or an obstacle to go.
 
-        For what is near it waits only where it will go on; it waits too while it is being found out if the residual
-        is a load (`Detection.lasting`).
+        It waits for an obstacle only where the task will continue; it also waits while the detector decides whether the
+        residual is a load (`Detection.lasting`).
         """
         quiet = inputs.mass.quiet[0]
-        waits_for = (near and not given_up(place, self.give_up)) or self._presses(inputs.mass)
+        waits_for = (near and not is_given_up(place, self.give_up)) or self._presses(inputs.mass)
         return inputs.detection.lasting or quiet < self.quiet_s or (waits_for and quiet < self.patience_s)
 
     def _presses(self, mass: VirtualMass) -> bool:
-        """Whether an arm that static friction holds has detected a contact of late."""
+        """Return whether an arm that static friction holds has recently detected a contact."""
         return self.static_friction_nm > 0 and mass.no_contact[0] < self.quiet_s
 
 
@@ -260,19 +261,19 @@ def _axes(body: Body, kin: Kinematics) -> Axes:
 
 
 def _residual(inputs: ReactionInputs) -> FloatArray:
-    """Return the external torques (n,) [Nm]; without an estimate, those of free motion, which drive nothing."""
+    """Return the external torques (n,) [Nm]; without an estimate those of free motion, which move nothing."""
     residual = inputs.detection.residual
     return residual if below(residual, np.inf) else inputs.mass.mean[1].copy()
 
 
-def _caught(clamp: ClampState) -> str:
-    """Say what the arm is caught between, or how that shows."""
+def _clamp_detail(clamp: ClampState) -> str:
+    """Return the detail of a clamp: the parts around it, or the torque that shows it."""
     if clamp.between:
         return f"{clamp.between}, pushed apart with {clamp.force:.0f} N"
-    return f"{clamp.torque:.1f} Nm against the direction it yielded in"
+    return f"{clamp.torque:.1f} Nm against the direction of yielding"
 
 
 _FAR = 0.95
-"""Share of its reach from which the arm says that it goes no farther."""
+"""Share of its reach from which the arm reports that it moves no farther."""
 _LEAST_N = 5.0
-"""Least force by which torques are divided [N]: the estimate of a smaller one is mostly noise."""
+"""Least force that divides torques [N]: the estimate of a smaller one is mostly noise."""

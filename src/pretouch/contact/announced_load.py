@@ -1,8 +1,8 @@
-"""A load that a program announces: what it does to the external torques and the force is taken out before detection.
+"""A load that a program announces: its part of the external torques and the force is removed before detection.
 
-When it comes is known to `Payload.within_s` only, and an object on a table comes bit by bit. For so long any part of
-the change from the load before is taken out, the part that leaves least of the torques. Then all of it is, and
-a detector that learns free motion doubts it.
+Its time is known to `Payload.within_s` only, and an object on a table is lifted gradually. For that time a part of the
+change from the load before is removed: the part that leaves the smallest torques. After that all of it is removed, and
+a detector that learns free motion widens its uncertainty.
 """
 
 from dataclasses import replace
@@ -20,53 +20,53 @@ _NOTHING = Payload(0.0)
 _GRAVITY = np.array([0.0, 0.0, 9.81])
 _OBSERVER_1_S = SequentialParams().observer_gain_1_s
 _MASS_PART, _OFF_M = 0.05, 0.02
-"""Deviations of what is announced: of the mass, as a part of it, and of the centre [m]."""
+"""Standard deviations of an announcement: of the mass, as a part of it, and of the centre [m]."""
 _BEYOND = 2.0 * _MASS_PART
-"""What part of the change beyond nothing and all of it passes while it is awaited."""
+"""Part of the change below 0 and above 1 that is accepted during the wait."""
 
 
 @value
 class LoadState:
-    """What was announced, and how it comes. Recordings keep these names."""
+    """An announced load, and its arrival. Recordings store these names."""
 
     payload: Payload
     before: Payload
-    """What was carried before it."""
+    """Load before it."""
     waited: float
-    """Time since it was announced [s]."""
+    """Time since the announcement [s]."""
     twist: FloatArray | None
-    """(6,) commanded velocity of the end-effector, as late as the torques [m/s, rad/s]; None before the first step."""
+    """(6,) commanded velocity of the end-effector, delayed as the torques [m/s, rad/s]; None before the first step."""
     free: FloatArray
-    """(n,) torques of free motion without a load, by the detector in the step before [Nm]."""
+    """(n,) torques of free motion without the load, by the detector in the step before [Nm]."""
     doubted_kg: float = 0.0
-    """How much it changes from this step on, not to be awaited any more [kg]; 0 in all other steps."""
+    """Change of the mass in the step that ends the wait [kg]; 0 in all other steps."""
 
 
-def announced(state: LoadState | None, said: Payload | None, robot: RobotState) -> LoadState | None:
-    """Return what is known of the load once a payload was given; None: nothing was said, and what was said stays."""
-    if said is None or (state is not None and said == state.payload):
+def announce(state: LoadState | None, payload: Payload | None, robot: RobotState) -> LoadState | None:
+    """Return the state after an announcement; without one, for None, the state stays."""
+    if payload is None or (state is not None and payload == state.payload):
         return state
     if state is None:
-        return LoadState(said, _NOTHING, 0.0, None, np.zeros(len(robot.q)))
-    return replace(state, payload=said, before=state.payload, waited=0.0)
+        return LoadState(payload, _NOTHING, 0.0, None, np.zeros(len(robot.q)))
+    return replace(state, payload=payload, before=state.payload, waited=0.0)
 
 
 def without_load(
     state: LoadState, model: RobotModel, kin: Kinematics, robot: RobotState, period: float
 ) -> tuple[RobotState, LoadState]:
-    """Return a robot's state with the load taken out of its torques and force, and what to remember."""
+    """Return a robot's state without the load in its torques and force, and the state of the load."""
     keep, J, R = np.exp(-_OBSERVER_1_S * period), model.ee_jacobian(kin), kin.rotation[model.ee]
     twist = J @ robot.qd_commanded
     before = twist if state.twist is None else state.twist
     twist = keep * before + (1.0 - keep) * twist
-    # by differences, so that a path's bend is in it: at 1 m/s it throws a load outwards by a fifth of its weight
+    # by differences, so that it includes the bend of a path: at 1 m/s that adds a fifth of the load's weight
     acceleration = (twist - before) / period
     load, within = wrench_of(state.payload, R, acceleration), state.payload.within_s
     if state.waited < within:
         earlier = wrench_of(state.before, R, acceleration)
         load = earlier + _share(J, robot, state.free + J.T @ earlier, load - earlier) * (load - earlier)
     waited = state.waited + period
-    # doubted only now: while any part of it passed, the torques taught nothing of the mass
+    # only now: during the wait, the torques said nothing about the mass
     changed = abs(state.payload.mass_kg - state.before.mass_kg) if state.waited < within <= waited else 0.0
     wrench = None if robot.wrench is None else robot.wrench - load
     after = replace(state, waited=waited, twist=twist, doubted_kg=changed)
@@ -84,24 +84,24 @@ def wrench_of(payload: Payload, R: FloatArray, acceleration: FloatArray) -> Floa
 
 
 def _share(J: FloatArray, robot: RobotState, torque: FloatArray, change: FloatArray) -> float:
-    """Return how much of the change of a wrench (6,) explains the torques beyond those (n,) without it best."""
+    """Return the part of a change of the wrench (6,) that best explains the torques beyond those (n,) without it."""
     measured, expected = robot.tau_ext, J.T @ change
-    if np.isnan(measured).any():  # a detector by the force needs no torques
+    if np.isnan(measured).any():  # a detector that uses the force needs no torques
         measured = torque if robot.wrench is None else J.T @ robot.wrench
-    # least squares; nothing of the change where it is none
+    # least squares; 0 for a change of 0
     size = float(expected @ expected)
     part = float(expected @ (measured - torque)) / size if size > 0.0 else 0.0
     return min(max(part, -_BEYOND), 1.0 + _BEYOND)
 
 
-def kept_free(state: LoadState, torque: FloatArray, residual: FloatArray) -> LoadState:
-    """Keep what a detector takes for free motion: torques (n,) without the load less its residual (n,) [Nm]."""
+def store_free_torques(state: LoadState, torque: FloatArray, residual: FloatArray) -> LoadState:
+    """Store the torques of free motion: those (n,) without the load less the detector's residual (n,) [Nm]."""
     free = torque - residual
     return state if np.isnan(free).any() else replace(state, free=free)
 
 
-def doubted(model: ResidualModel, kg: float) -> ResidualModel:
-    """Return a model of free motion that doubts a load of which so much is new [kg]."""
+def widen_for_load(model: ResidualModel, kg: float) -> ResidualModel:
+    """Return a model of free motion with the uncertainty of a load whose mass has changed [kg]."""
     covariance = model.covariance.copy()
     covariance[:, 0, 0] += (kg * _GRAVITY[2] * _OFF_M) ** 2
     covariance[:, -1, -1] += (kg * _MASS_PART) ** 2

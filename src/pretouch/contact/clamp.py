@@ -1,8 +1,8 @@
-"""Caught between two objects, between two links of the arm, or between a link and a fixture; and how the arm opens.
+"""Clamps between the arm and objects, pinches between two links or a link and a fixture; and how the arm opens them.
 
 Two opposite forces f on links a and b make the torques (J_b - J_a)^T f, which turn only the joints between the two
 links. A contact from outside turns the joints before its link too, unless its line of action passes through their axes.
-What is between a link and a fixture pushes the link away from it, a gap's width before it, while the arm closes the
+An object between a link and a fixture pushes the link away, a gap's width before the fixture, while the arm closes the
 gap. See docs/explanation/reaction.md.
 """
 
@@ -22,56 +22,56 @@ from pretouch.types import FloatArray, Touched
 from pretouch.values import value
 
 _APART_S = 0.05
-"""Time between two places of the path the arm came [s]."""
+"""Time between two marks of the arm's path [s]."""
 
 
 @value
 class ClampState:
-    """What is remembered of one reaction to tell a clamp."""
+    """Memory of one reaction for the detection of a clamp."""
 
     course: FloatArray
     """(n,) unit vector of the joint velocities with which the arm last followed a push, zero before."""
     pushed: float
-    """Time since it followed one [s]."""
+    """Time since it last followed a push [s]."""
     opposed: float
-    """Time for which the torque has been against the course [s]."""
+    """Time for which the torque has opposed the course [s]."""
     turns: int
     """Reversals of the course."""
     turned: float
-    """Time since the last of them [s]."""
+    """Time since the last reversal [s]."""
     trail: FloatArray
-    """(M, n) joint positions commanded since the contact, newest first, or on the way to it [rad]."""
+    """(M, n) joint positions commanded since the contact, or before it for a pinch, newest first [rad]."""
     marked: float
-    """Time since the newest was noted [s]."""
+    """Time since the newest mark [s]."""
     torque: float
-    """Torque against the course that made it a clamp [Nm], 0 while there is none."""
+    """Torque of the clamp against the course [Nm], 0 without a clamp."""
     opening: float
-    """Time for which the arm has opened [s]."""
+    """Time for which the arm has been opening [s]."""
     open: bool
-    """Whether it has."""
+    """True once the arm has opened."""
     came: FloatArray
-    """(n,) joint velocities with which the arm came to the contact [rad/s]."""
+    """(n,) joint velocities of the arm at the contact [rad/s]."""
     between: str
-    """What something is caught between, in words; '' while that is not known."""
+    """Both parts of a pinch, in words; '' for a clamp."""
     force: float
-    """Force with which that is pushed apart [N]."""
+    """Force with which these parts are pushed apart [N]."""
 
 
 def clamp_init(q: FloatArray) -> ClampState:
-    """Return the state of an arm that has met nothing, at joint positions (n,) [rad]."""
+    """Return the state of an arm without a contact, at joint positions (n,) [rad]."""
     there, none = np.tile(q, (MARKS, 1)), np.zeros(len(q))
     return ClampState(none, np.inf, 0.0, 0, np.inf, there, 0.0, 0.0, 0.0, False, none, "", 0.0)
 
 
 @compiled
 def note_place(path: FloatArray, marked: FloatArray, q: FloatArray, dt: float) -> None:
-    """Note the path (M, n) of an arm that follows its task, at commanded joint positions q (n,) [rad].
+    """Add a mark to the path (M, n) of an arm that follows its task, at commanded joint positions q (n,) [rad].
 
-    Where it has been moved meanwhile, by a reaction or by hand, the path begins anew. `marked` (1,) is the time since
-    the newest place was noted [s].
+    After another motion, by a reaction or by hand, the path starts anew. `marked` (1,) is the time since the newest
+    mark [s].
     """
     marked[0] += dt
-    # farther from one mark than the task goes until the next: something else has moved the arm
+    # farther from a mark than the task moves until the next: something else has moved the arm
     if not below(q - path[0], _MOVED_RAD):
         marked[0], path[:] = 0.0, q
     elif marked[0] >= _APART_S:
@@ -79,23 +79,23 @@ def note_place(path: FloatArray, marked: FloatArray, q: FloatArray, dt: float) -
         path[0] = q
 
 
-def caught_between(state: ClampState, path: FloatArray, between: str, force: float, torque: FloatArray) -> ClampState:
-    """Take what is caught between two objects, and turns the joints (n,) [Nm], for a clamp.
+def begin_pinch(state: ClampState, path: FloatArray, between: str, force: float, torque: FloatArray) -> ClampState:
+    """Return the state of a pinch with a torque (n,) [Nm].
 
-    Out of it the arm opens along its path (M, n) [rad] before the contact.
+    The arm opens it along its path (M, n) [rad] before the contact.
     """
     size = float(np.abs(torque).max())
     return replace(state, torque=size, trail=path.copy(), between=between, force=force, opposed=0.0)
 
 
-def clamped(
+def update_clamp(
     state: ClampState, torque: FloatArray, velocity: FloatArray, q: FloatArray, dt: float, p: ClampParams
 ) -> ClampState:
-    """Judge one period of yielding.
+    """Update the detection of a clamp by one period of yielding.
 
-    A clamp is a torque against the course the arm follows a push on, for longer than noise makes one, and so soon
-    after the push that it may still be there. Later it is a push of its own, to be yielded to; but that too is a clamp
-    when the arm has been sent to and fro. A push from the side, or harder in the same direction, is none.
+    A clamp is a torque against the course on which the arm follows a push, for longer than noise makes one, and so soon
+    after the push that the push may still be there. Later it is a push of its own, to which the arm yields; but that
+    too is a clamp when the arm is pushed to and fro. A push from the side, or harder in the same direction, is none.
 
     Args:
         state: memory.
@@ -112,42 +112,39 @@ def clamped(
     # `pushed` counts on while a torque opposes, which may begin at the end of the window
     soon = state.pushed < _WINDOW_S + _OPPOSED_S
     course, pushed, turns, turned = state.course, state.pushed + dt, state.turns, state.turned + dt
-    # the arm follows a push: it moves, half of a clamp's torque or more drives it, and no clamp is being timed
+    # the arm follows a push: it moves, half of a clamp's torque or more drives it, and no torque opposes it
     if speed > _COURSE_RAD_S and torque @ velocity > 0.5 * p.torque_nm * speed and not (soon and opposed > 0):
         reversed_ = bool(velocity @ course < 0)
         turns = (turns if turned < _TURN_S else 0) + 1 if reversed_ else turns
         course, pushed, turned = velocity / speed, 0.0, 0.0 if reversed_ else turned
     # 1e-9, for sums of periods are not exact
-    caught = (soon and opposed >= _OPPOSED_S - 1e-9) or turns >= _TURNS
+    clamped = (soon and opposed >= _OPPOSED_S - 1e-9) or turns >= _TURNS
     trail, marked = state.trail, state.marked + dt
     if marked >= _APART_S:
         trail, marked = np.vstack((q[None], trail[:-1])), 0.0
-    # never 0, which says that there is no clamp: two reversals may be found at a small torque
-    against = max(abs(along), p.torque_nm) if caught else 0.0
-    return replace(
-        state, course=course, pushed=pushed, opposed=opposed, turns=turns, turned=turned, trail=trail, marked=marked,
-        torque=against,
-    )  # fmt: skip
+    # never 0, which stands for no clamp: two reversals may have a small torque
+    against = max(abs(along), p.torque_nm) if clamped else 0.0
+    state = replace(state, course=course, pushed=pushed, opposed=opposed, turns=turns, turned=turned)
+    return replace(state, trail=trail, marked=marked, torque=against)
 
 
-def opened(
+def open_clamp(
     state: ClampState, torque: FloatArray, q: FloatArray, dt: float, p: ClampParams
 ) -> tuple[FloatArray, ClampState]:
-    """Return the joint velocities (n,) [rad/s] back to the next place of the path the arm came, of any length.
+    """Return the joint velocities (n,) [rad/s] back to the next mark of the arm's path, of any length.
 
-    It ends after its time, at the end of the path, and where something opposes it as a clamp does: the arm is then not
-    pushed into what pushes it. What of the path to something caught between two links has been opened already is left
-    out.
+    The motion ends after its time, at the end of the path, and where a torque opposes it as in a clamp: the arm then
+    does not push against a force. Marks of the path to a pinch that are already behind the arm are left out.
 
     Args:
-        state: memory, of a clamp.
+        state: of a clamp.
         torque: (n,) external torque [Nm].
         q: (n,) commanded joint positions [rad].
         dt: period [s].
         p: parameters.
     """
     trail = state.trail
-    # past the places that are reached, and those that lead back into what is caught
+    # skip the marks that are reached, and those that lead back into the pinch
     while len(trail) > 1 and (np.abs(trail[0] - q).max() < _NEAR_RAD or _closes(state, trail[0] - q)):
         trail = trail[1:]
     back = trail[0] - q
@@ -156,35 +153,35 @@ def opened(
     against = length > 0 and float(torque @ back) < -p.torque_nm * length
     opposed = state.opposed + dt if against else 0.0
     over = state.opening + dt > p.open_s or opposed >= _OPPOSED_S - 1e-9 or float(np.abs(back).max()) < _NEAR_RAD
-    # to the place within one period: the caller slows that down to `open_m_s`
+    # to the mark within one period: the caller slows that down to `open_m_s`
     return back / dt, replace(state, opposed=opposed, trail=trail, opening=state.opening + dt, open=state.open or over)
 
 
 def _closes(state: ClampState, motion: FloatArray) -> bool:
-    """Whether a motion (n,) [rad] leads back to something caught between two links."""
+    """Return whether a motion (n,) [rad] closes a pinch again."""
     return state.between != "" and float(motion @ state.came) > 0.0
 
 
 _COURSE_RAD_S = 0.05
-"""Speed in joint space from which the arm is on a course [rad/s]."""
+"""Speed in joint space from which the arm has a course [rad/s]."""
 _OPPOSED_S = 0.03
-"""Time for which a torque must oppose the yielding to be a clamp [s]: longer than noise of the estimate does."""
+"""Time for which a torque must oppose the yielding to be a clamp [s]: longer than noise of the estimate lasts."""
 _WINDOW_S = 0.25
-"""Time after a push in which what opposes the yielding is a clamp and no push of its own [s]."""
+"""Time after a push in which an opposing torque is a clamp and no push of its own [s]."""
 _TURNS = 2
-"""Reversals of the yielding, less than `_TURN_S` apart, that let the arm get nowhere and are a clamp too."""
+"""Reversals of the yielding, less than `_TURN_S` apart, that are a clamp too."""
 _TURN_S = 2.0
 """See `_TURNS` [s]."""
 _MOVED_RAD = 0.15
-"""More than a joint turns from one place of the path to the next while the arm follows its path [rad]."""
+"""More than a joint turns from one mark to the next while the arm follows its path [rad]."""
 _NEAR_RAD = 0.002
-"""Distance at which a place of the path counts as reached [rad]."""
+"""Distance at which a mark of the path counts as reached [rad]."""
 
 
-def find_self_clamp(
+def find_pinch(
     model: RobotModel, kin: Kinematics, torque: FloatArray, covariance: FloatArray, qd: FloatArray, p: PinchParams
 ) -> tuple[int, int, float] | None:
-    """Return two links that something is caught between, and the force with which it pushes them apart [N], or None.
+    """Return the two links of a pinch, and the force with which it pushes them apart [N], or None.
 
     The links approach each other.
 
@@ -192,8 +189,8 @@ def find_self_clamp(
         model: the arm.
         kin: its posture.
         torque: (n,) external torques less those of free motion [Nm].
-        covariance: (n, n) of what free motion leaves of them [Nm^2].
-        qd: (n,) joint velocities with which the arm came to the contact [rad/s].
+        covariance: (n, n) of the torques in free motion [Nm^2].
+        qd: (n,) joint velocities of the arm at the contact [rad/s].
         p: parameters.
     """
     body, (first, second) = model.capsules, model.apart.T
@@ -203,15 +200,15 @@ def find_self_clamp(
     length = np.sqrt((between**2).sum(axis=1))
     gap = length - body.radius[first] - body.radius[second]
     # torques in units of their standard deviations: z = L^-1 tau
-    caught, best, white = None, -np.inf, np.linalg.inv(np.linalg.cholesky(covariance))
+    pinch, best, white = None, -np.inf, np.linalg.inv(np.linalg.cholesky(covariance))
     z = white @ torque
     size = float(z @ z)
     for k in np.flatnonzero((gap > 0.0) & (gap < p.gap_m)):
         one, other, u = body.link[first[k]], body.link[second[k]], between[k] / length[k]
-        # base and second link: what is between them turns the first joints, as a push from the side does
+        # base and second link: an object between them turns the first joints, as a push from the side does
         if model.moved_by[one].sum() + model.moved_by[other].sum() <= _FIRST_JOINTS:
             continue
-        # it touches both links on their surfaces, where they are nearest to each other
+        # the object touches both links at their nearest points
         at_one, at_other = p1[k] + body.radius[first[k]] * u, p2[k] - body.radius[second[k]] * u
         J = model.jacobian(kin, other, at_other)[:3] - model.jacobian(kin, one, at_one)[:3]
         # the gap closes at -u^T (J_b - J_a) qd
@@ -221,27 +218,27 @@ def find_self_clamp(
         A = white @ J.T
         force = np.linalg.lstsq(A, z, rcond=1e-3)[0]
         along, rest = float(force @ u), float(((z - A @ force) ** 2).sum())
-        # it pushes the links apart, within a cone about the line between them
+        # the force pushes the links apart, within a cone about the line between them
         if along < max(p.force_n, _ALONG * float(np.linalg.norm(force))):
             continue
-        # what is left is noise, and what is explained is not
+        # the rest is noise, and the explained part is not
         if rest > _REST or size - rest < _EXPLAINED:
             continue
-        # twice a log-posterior: a Gaussian of what is left, an exponential prior of the thickness of what is caught
+        # twice a log-posterior: a Gaussian of the rest, an exponential prior of the object's thickness
         odds = -rest - 2.0 * float(gap[k]) / _THICKNESS_M
         if odds > best:
-            caught, best = (int(one), int(other), along), odds
-    return caught
+            pinch, best = (int(one), int(other), along), odds
+    return pinch
 
 
 def presses_on_fixture(body: Body, kin: Kinematics, touched: Touched, qd: FloatArray, p: PinchParams) -> bool:
-    """Whether a link presses something against a fixture, by the most certain contact's point and force.
+    """Return whether a link presses an object against a fixture, by the most certain contact's point and force.
 
     Args:
         body: the arm and its fixtures, whose normals point into free space.
         kin: its posture.
         touched: the contacts.
-        qd: (n,) joint velocities with which the arm came to the contact [rad/s].
+        qd: (n,) joint velocities of the arm at the contact [rad/s].
         p: parameters.
     """
     if not len(touched.link):
@@ -260,27 +257,27 @@ def presses_on_fixture(body: Body, kin: Kinematics, touched: Touched, qd: FloatA
         far = np.linalg.norm(point - foot, axis=1)
         gap = np.concatenate([gap, far - standing.radius])
         away = np.concatenate([away, (point - foot) / np.maximum(far, _ON_AXIS_M)[:, None]])
-    # nearer than `_LEAST_GAP_M` it is the fixture itself that the arm touches
+    # nearer than `_LEAST_GAP_M`, the arm touches the fixture itself
     return bool(np.any((gap > _LEAST_GAP_M) & (gap < p.gap_m) & (away @ force > _ALONG * size)))
 
 
 _LEAST_GAP_M = 0.02
-"""Gap to a fixture below which the link touches the fixture itself [m]: as well as the place of a contact is known."""
+"""Gap to a fixture below which the link touches the fixture itself [m]: the error of a contact's place."""
 _FIRST_JOINTS = 2
-"""Joints of which the torques alone do not tell what is caught from a push: one from the side at the hand of an arm of
-six joints turns the first only."""
+"""Number of first joints whose torques alone do not distinguish a pinch from a push: a push from the side at the hand
+of an arm with six joints turns the first one only."""
 _CLOSING_M_S = 0.02
-"""Speed from which a gap counts as closing [m/s]: two links with a single link between them come nearer to each other
-by less, whatever the arm does."""
+"""Speed from which a gap counts as closing [m/s]: two links with a single link between them approach each other more
+slowly in any motion."""
 _THICKNESS_M = 0.06
-"""Mean thickness of what may be caught, between finger and forearm [m]: of two gaps that explain the torques as well,
-the narrower one is taken."""
+"""Mean thickness of an object in a pinch, between finger and forearm [m]: of two gaps that explain the torques equally
+well, the narrower one is chosen."""
 _ALONG = 0.85
 """Cosine of the largest angle between the force and the shortest line across the gap: friction."""
 _REST = 9.0
-"""Square of the torques that a caught object may leave unexplained, in deviations of free motion [1]: 94 % of the
-chi-square distribution of the four that a force does not explain."""
+"""Square of the torques that a pinch may leave unexplained, in deviations of free motion [1]: 94 % of the chi-square
+distribution of the four degrees of freedom that a force does not explain."""
 _EXPLAINED = 27.0
-"""Least square of the torques that it has to explain [1]. Of 297 contacts from outside one met both bounds."""
+"""Least square of the torques that it has to explain [1]. One of 297 contacts from outside satisfied both bounds."""
 _ON_AXIS_M = 1e-9
 """Distance from a capsule's axis below which no direction leads away from it [m]."""

@@ -1,4 +1,4 @@
-"""The interface of contact detectors: what one is given of each step, and what it answers."""
+"""The interface of contact detectors: samples in, detections out."""
 
 import math
 from dataclasses import field
@@ -13,22 +13,13 @@ from pretouch.robot.body import Capsules, no_capsules
 from pretouch.robot.kinematics import Kinematics, below
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import (
-    NOT_TOUCHED,
-    Contact,
-    FloatArray,
-    Obstacles,
-    RobotState,
-    Thresholds,
-    Touched,
-    TouchReadings,
-)
+from pretouch.types import NOT_TOUCHED, Contact, FloatArray, Obstacles, RobotState, Thresholds, Touched, TouchReadings
 from pretouch.values import value
 
 
 @value
 class Body:
-    """What is fixed of an arm, its units and what stands beside it."""
+    """Constants: an arm, its units and its fixtures."""
 
     model: RobotModel
     skin: Skin
@@ -42,7 +33,7 @@ class Body:
 
 @value
 class Sample:
-    """What a detector is given of one step."""
+    """Inputs of a detector in one step."""
 
     stamp: float
     """Instant of the step [s]."""
@@ -53,93 +44,93 @@ class Sample:
     window: Window
     """Force window with the force of this step in it (eq. 8)."""
     armed: bool
-    """Whether the window was full before this step: a contact before is none."""
+    """True if the window was full before this step: before that no contact counts."""
     obstacles: Obstacles
-    """What is near."""
+    """Obstacles near the arm."""
     reacting: bool = False
-    """Whether the arm moves with a contact."""
+    """True while the arm moves with a contact."""
     watched: bool = False
-    """Whether a skin watches, all of its units heard."""
+    """True if there is a skin and none of its units is silent."""
     touches: TouchReadings | None = None
-    """Of the units' touch sensors; None without."""
+    """Readings of the units' touch sensors; None without any."""
     doubted_kg: float = 0.0
-    """How much of an announced load is taken out of torques and force anew, and may be a little off [kg]."""
+    """Change of the announced load that is removed from torques and force from this step on [kg]."""
 
 
 @value
 class Detection:
-    """What a detector says of one step."""
+    """Result of a detector for one step."""
 
     thresholds: Thresholds
     contact: Contact | None
     armed: bool
-    """Whether a contact could be detected."""
+    """True if a contact could be detected."""
     residual: FloatArray
-    """(n,) external joint torques less what the detector takes for free motion [Nm]; NaN without torques."""
+    """(n,) external joint torques less the detector's model of free motion [Nm]; NaN without torques."""
     evidence: float
-    """How far the test is on the way to a contact: one from 1 on, while armed."""
+    """Evidence for a contact: from 1 on there is one, while armed."""
     lasting: bool = False
-    """Whether it is being found out if the residual is a load or an error of the estimate: the arm waits for that."""
+    """True while the detector decides whether the residual is a load or an error of the estimate: the arm waits."""
     touched: Touched = field(default_factory=lambda: NOT_TOUCHED)
-    """Where the arm is touched; empty where no contact is detected or the profile does not localise."""
+    """Place and force of the contact; empty where none is detected or the profile does not localise."""
     significant: tuple[FloatArray, FloatArray] | None = None
-    """Residual (n,), averaged over the time in which it stands out most [Nm], and the covariance (n, n) that it has in
-    free motion [Nm^2]; None where the detector has none, or no contact is detected."""
+    """Residual (n,), averaged over the time in which it is most significant [Nm], and its covariance (n, n) in free
+    motion [Nm^2]; None without them, or without a contact."""
     detectable_n: float = math.nan
-    """Force at the end-effector, in the direction the torques tell least of, that is found in 95 of 100 cases if it is
-    held for 0.1 s [N]; NaN of a detector that does not say."""
+    """Force at the end-effector that is detected in 95 of 100 cases if it lasts for 0.1 s, in the direction where the
+    torques are least sensitive [N]; NaN if the detector does not compute it."""
 
 
 class Detector(Part, group="pretouch.detectors"):
-    """Distinguishes a contact from free motion, from the external torques and the force of each step.
+    """Distinguishes contacts from free motion, by the external torques and the force of each step.
 
-    A frozen dataclass of its own parameters. `init` and `step` are pure: what is remembered goes in and out as `state`.
+    A frozen dataclass of its own parameters. `init` and `step` are pure: all memory goes in and out as `state`.
     """
 
     by_torques: ClassVar[bool] = True
-    """Whether it needs the external joint torques; else the force."""
+    """True if it uses the external joint torques, False if it uses the force."""
 
     @property
     def reads_touch(self) -> bool:
-        """Whether it takes the units' touch readings."""
+        """True if it uses the units' touch readings."""
         return False
 
     def init(self, body: Body, learnt: ResidualModel | None = None) -> Any:
-        """Return what is remembered before the first step.
+        """Return the state before the first step.
 
-        `learnt` is the arm's free motion as an earlier session left it, for a detector that learns it.
+        `learnt` is the model of free motion from an earlier session, for a detector that learns one.
         """
         return None
 
     def step(self, state: Any, body: Body, sample: Sample) -> tuple[Detection, Any]:
-        """Take in one step, and say whether it is a contact; return that and what to remember."""
+        """Return the detection for one step, and the state after it."""
         raise NotImplementedError
 
     def adopted(self, state: Any, body: Body, before: "Detector") -> Any:
-        """Go on from the state of another detector; by default only from one of the same kind."""
+        """Return the state that follows that of another detector, by default only of one of the same kind."""
         return state if type(before) is type(self) else self.init(body)
 
     def learnt(self, state: Any) -> ResidualModel | None:
-        """Return what was learnt of free motion, to be kept for the next session; None of one that learns none."""
+        """Return the model of free motion, to be stored for the next session; None for a detector without one."""
         return None
 
     def largest_missed_n(self, body: Body, speed: float) -> float:
-        """Largest force on one axis [N] at which it may still be silent, at this speed of the joints [rad/s].
+        """Return the largest force on one axis [N] that it may miss, at a speed of the joints [rad/s].
 
-        An arm that stops by itself must not do so before.
+        An arm that stops by itself must not do so below that force.
         """
         raise NotImplementedError
 
 
 def no_torques(body: Body, sample: Sample) -> Detection | None:
-    """Return what a detector by torques says where there are none, or None where there are."""
+    """Return the detection of a detector by torques for a step without torques; None for a step with them."""
     if below(sample.robot.tau_ext, np.inf):
         return None
     return Detection(Thresholds(*np.full((6, 3), np.nan)), None, False, np.full(body.model.n, np.nan), 0.0)
 
 
 def strongest(force: FloatArray, bands: Thresholds) -> Contact:
-    """Return a contact with the axes whose equivalent band is passed, or else the one with the largest part."""
-    # the bands are of one sample: where the test decided by a longer mean it may be that no axis passes its own
+    """Return a contact with the axes whose band is exceeded, or with the axis of the largest part of its band."""
+    # the bands are for one sample: where the test decides by a longer mean, no axis may exceed its own
     share = np.abs(force) / (bands.upper - bands.mean)
     return Contact(force, share >= min(1.0, float(share.max())))

@@ -1,8 +1,8 @@
-"""A residual that stays: a load gripped or put down, or a step of an estimate; how it differs from a contact.
+"""A residual that lasts: a load that is gripped or put down, or a step of an estimate; the difference from a contact.
 
-While nothing is near, a torque that goes on being explained by the same weight at the end-effector, or by the same
-small torque on one joint alone, is learnt as free motion, whether the arm stands or yields. A person who is caught is
-neither: near, or not constant, or not straight down, or measured by more than one joint.
+While nothing is near, a torque that the same weight at the end-effector continues to explain, or the same small torque
+on one joint alone, is learnt as free motion, whether the arm stands or yields. A clamped person is neither: near, or
+not constant, or not straight down, or measured by more than one joint.
 """
 
 import numpy as np
@@ -17,31 +17,30 @@ from pretouch.types import FloatArray
 MOST_KG = 3.0
 """Largest load: a Panda's payload [kg]."""
 _LEAST_KG = -0.3
-"""A load that seems to be less than nothing by more than this is a force from below [kg]: what is wrong with the links'
-masses may look like so much."""
+"""A load below this is a force from below [kg]: errors of the links' masses may look like so much."""
 _FAR_M = 0.15
-"""How far the centre of a load may be from the end-effector's origin along each horizontal base axis [m]: the prior's
-deviation for the largest load. What is refused is a sum of both beyond twice of it, so along one axis alone 0.3 m."""
+"""Distance of a load's centre from the end-effector's origin along each horizontal base axis [m]: the prior's deviation
+for the largest load. A sum of both beyond twice of it is refused, so along one axis alone 0.3 m."""
 _OFFSETS = 3.0
-"""Deviations of a joint's offset before anything is learnt that its whole offset may be, for a step to be learnt."""
+"""Largest offset of a joint after a step, in deviations of its prior."""
 _UNKNOWN_NM = 0.3
-"""What the mean of a joint's torque may be off, by friction [Nm]."""
+"""Error of the mean of a joint's torque by friction [Nm]."""
 _UNKNOWN_ALONE_NM = 0.15
-"""The same where a step of one joint is distinguished from a contact, which other joints measure too [Nm]."""
+"""The same for a step of one joint: a contact would show in other joints too [Nm]."""
 _CHANGE_NM = 0.6
-"""How much a constant torque may change while the arm creeps, by friction [Nm]."""
+"""Change of a constant torque while the arm creeps, by friction [Nm]."""
 _CHANGE_PART = 0.1
-"""What part of a load's largest torque is added to that while the arm moves."""
+"""Part of a load's largest torque that is added to that while the arm moves."""
 _DEVIATIONS = 4.0
-"""How many deviations a constant torque may seem to change, and what is not a load may be."""
+"""Deviations that a constant torque may seem to change, and that a load may leave unexplained."""
 _ALONE_DEVIATIONS = 2.5
-"""The same for what is not a step of one joint."""
+"""The same for a step of one joint."""
 _GRAVITY = 9.81
 
 
 @kernel
 def _stands_out(residual: FloatArray, S: FloatArray) -> bool:
-    """Whether a mean (n,) of the longest window [Nm] is more than noise and friction leave of nothing."""
+    """Return whether a mean (n,) of the longest window [Nm] is more than noise and friction."""
     n = len(residual)
     C, L = np.empty((n, n)), np.zeros((n, n))
     _spread_of_mean(S, _UNKNOWN_ALONE_NM, C)
@@ -53,9 +52,9 @@ def _stands_out(residual: FloatArray, S: FloatArray) -> bool:
 def _still_explains(
     lasting: FloatArray, residual: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, moving: int
 ) -> bool:
-    """Whether what has lasted (3 + n,), see `find_lasting`, still explains a residual (n,) [Nm].
+    """Return whether a lasting load or step (3 + n,), see `find_lasting`, still explains a residual (n,) [Nm].
 
-    It does if no joint's torque has changed, and most of the residual is not left without it.
+    It does if no joint's torque has changed, and it explains more than half of the residual.
     """
     whole = left = largest = 0.0
     for j in range(len(residual)):
@@ -64,7 +63,7 @@ def _still_explains(
         # rows 3 and 4 of J turn about x and y: a weight has no moment about z, the vertical
         moments = _GRAVITY * (J[3, j] * lasting[1] + J[4, j] * lasting[2])
         rest = residual[j] - (lasting[0] * unit[j] + moments + lasting[3 + j])
-        # what lasts was found from a mean like this one: the difference of both has twice the variance of one
+        # the estimate came from a mean like this one: the difference of both has twice the variance of one
         allowed = _DEVIATIONS**2 * 2.0 * S[j, j] / LONGEST + _CHANGE_NM**2
         if moving:  # the mean is of another posture than this one
             allowed += (_CHANGE_PART * largest) ** 2
@@ -78,10 +77,10 @@ def _still_explains(
 def find_lasting(
     means: WindowMeans, x: FloatArray, weights: FloatArray, J: FloatArray, offset_prior: float, lasting: FloatArray
 ) -> bool:
-    """Write a load or a step of one joint that the residual can be, and return whether there is one.
+    """Write a load or a step of one joint that explains the residual, and return whether there is one.
 
     Args:
-        means: of the residual; the longest window counts.
+        means: of the residual; only the longest window counts.
         x: (n, f) features.
         weights: (n, f) of the mean learnt so far [Nm].
         J: (6, n) Jacobian of the end-effector.
@@ -91,14 +90,14 @@ def find_lasting(
     residual, S, n, last = means.mean[-1], means.S, x.shape[0], x.shape[1] - 1
     carried, load = np.empty(n), np.zeros(3)
     for j in range(n):
-        # of the mean, what may be weight: without friction, features 1 to PLAIN - 1
+        # the part of the mean that may be weight: without friction, features 1 to PLAIN - 1
         carried[j] = weights[j, 0] * x[j, 0]
         for a in range(PLAIN, last + 1):
             carried[j] += weights[j, a] * x[j, a]
     lasting[:] = 0.0
     joint, step, rest = _one_joint(residual, S)
     misfit = load_misfit(residual, carried, x[:, last].copy(), J, S, load)
-    # the whole offset is bounded, not the step: pushes that are taken for steps cannot add up
+    # the whole offset is bounded, not the step: so pushes that pass for steps cannot accumulate
     if joint >= 0 and abs(weights[joint, 0] + step) <= _OFFSETS * offset_prior and rest < misfit:
         lasting[3 + joint] = step
         return True
@@ -110,7 +109,7 @@ def find_lasting(
 
 @kernel
 def _one_joint(residual: FloatArray, S: FloatArray) -> tuple[int, float, float]:
-    """Return the joint whose torque alone explains a residual, that torque and the misfit; joint -1 if none does."""
+    """Return the joint whose torque alone explains a residual, the torque and the misfit; joint -1 if none does."""
     n, joint, step, best = len(residual), -1, 0.0, np.inf
     C, L, y, a, unit = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty(n), np.zeros(n)
     _spread_of_mean(S, _UNKNOWN_ALONE_NM, C)
@@ -133,14 +132,14 @@ def _one_joint(residual: FloatArray, S: FloatArray) -> tuple[int, float, float]:
 def load_misfit(
     residual: FloatArray, carried: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, load: FloatArray
 ) -> float:
-    """Write the weight at the end-effector, or one less, that a lasting residual may be (3,), see `find_lasting`.
+    """Write the change of a load (3,), see `find_lasting`, that explains a lasting residual.
 
-    Returns what it leaves of the residual's square, infinite where it cannot be a load. `carried` (n,) is what of the
-    mean may be weight, `unit` (n,) are the torques of 1 kg [Nm].
+    Returns the unexplained square of the residual, infinite where it is no load. `carried` (n,) is the part of the mean
+    that may be weight, `unit` (n,) are the torques of 1 kg [Nm].
     """
     n, whole = len(residual), np.empty(3)
     misfit = _fit_load(residual, unit, J, S, load)
-    # the change has either sign, as a load can be put down; what hangs there then cannot weigh less than nothing
+    # the change has either sign, as a load can be put down; the whole load cannot weigh less than nothing
     _fit_load(residual + carried, unit, J, S, whole)
     # the centre is too far off: |x| + |y| > 0.3 m; a load below 0.1 kg may have the moments of 0.1 kg
     near = abs(load[1]) + abs(load[2]) <= 2.0 * _FAR_M * max(abs(load[0]), 0.1)
@@ -151,7 +150,7 @@ def load_misfit(
 
 @kernel
 def _fit_load(residual: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, load: FloatArray) -> float:
-    """Write the load (3,) that explains a residual best, see `find_lasting`, and return what is left of its square."""
+    """Write the load (3,) that best explains a residual, see `find_lasting`; return its unexplained square."""
     n = len(residual)
     C, L, y, a = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty((3, n))
     G, K, b, u = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.empty(3)
@@ -161,7 +160,7 @@ def _fit_load(residual: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArr
         return np.inf
     # ridge regression of the whitened residual on the weight and both of its moments
     forward(L, unit, a[0])
-    for k in range(2):  # what its centre off the axis adds: moments about the horizontal axes
+    for k in range(2):  # the moments of its centre about the horizontal axes
         forward(L, J[3 + k] * _GRAVITY, a[1 + k])
     square = forward(L, residual, y)
     for i in range(3):
@@ -169,7 +168,7 @@ def _fit_load(residual: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArr
             b[i] += a[i, j] * y[j]
             for k in range(3):
                 G[i, k] += a[i, j] * a[k, j]
-        # prior deviations: the largest load, and that load as far off as it may be
+        # prior deviations: the largest load, and that load at the largest distance
         G[i, i] += 1.0 / (MOST_KG if i == 0 else MOST_KG * _FAR_M) ** 2
     if not factor(G, K):
         return np.inf
@@ -180,7 +179,7 @@ def _fit_load(residual: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArr
 
 @kernel
 def _spread_of_mean(S: FloatArray, unknown: float, C: FloatArray) -> None:
-    """Write the spread C (n, n) of a mean of the longest window, each joint's `unknown` [Nm] with it."""
+    """Write the spread C (n, n) of a mean of the longest window, with an `unknown` error [Nm] of each joint."""
     for i in range(len(S)):
         for j in range(len(S)):
             C[i, j] = S[i, j] / LONGEST
@@ -191,20 +190,20 @@ def _spread_of_mean(S: FloatArray, unknown: float, C: FloatArray) -> None:
 def _learn_lasting(
     lasting: FloatArray, residual: FloatArray, x: FloatArray, S: FloatArray, model: ResidualModel, prior: FloatArray
 ) -> None:
-    """Take what has lasted into the mean at once: all joints carry a load, one joint its step.
+    """Add a lasting load or step to the mean at once: a load to all joints, a step to its joint.
 
-    What is left of the residual (n,) goes into the load and the offset of each joint alone.
+    The rest of the residual (n,) goes into the load and the offset of each joint alone.
     """
     n, load = x.shape[0], x.shape[1] - 1
     weights, covariance, kg = model.weights, model.covariance, lasting[0]
     for j in range(n):
-        # the torque itself: the residual is what the mean has left of it
+        # the torque itself: the residual and its mean
         torque = residual[j]
         for a in range(load + 1):
             torque += weights[j, a] * x[j, a]
         weights[j, load] += kg
         weights[j, 0] += lasting[3 + j]
-        # the load's moments have no feature: the offsets take them up, as they are in this posture
+        # the load's moments have no feature: the offsets absorb them, for this posture
         if kg != 0.0:
             covariance[j, 0, 0] += prior[0]
             covariance[j, load, load] += (_LOAD_KG + _LOAD_PART * abs(kg)) ** 2
@@ -214,7 +213,7 @@ def _learn_lasting(
 
 
 _LOAD_KG, _LOAD_PART = 0.1, 0.05
-"""Deviation of a load that has just been learnt, and what part of it is added [kg]."""
+"""Deviation of a load that has just been learnt [kg], and the part of it that is added."""
 
 
 @kernel
@@ -222,14 +221,14 @@ def follow_lasting(
     state: SequentialState, reacting: bool, suspected: bool, numbers: SequentialNumbers, sample: FreeSample,
     means: WindowMeans, J: FloatArray,
 ) -> None:  # fmt: skip
-    """Count the samples that the same load or step has explained, and learn it once these are enough.
+    """Count the samples that the same load or step explains, and learn it when these are enough.
 
-    Samples count in which a contact is suspected or the arm reacts, but only what stands out is something to find out.
+    Samples with a suspected contact or a reaction count; a count starts only with a significant residual.
 
     Args:
         state: memory, changed.
         reacting: whether the arm moves with a contact.
-        suspected: whether a contact is.
+        suspected: whether a contact is suspected.
         numbers: of the test.
         sample: the newest.
         means: of all windows.
@@ -237,7 +236,7 @@ def follow_lasting(
     """
     residual, S, x, model, steady = means.mean[-1], means.S, sample.x, state.model, state.steady
     n, counts = len(residual), suspected or reacting
-    # the torques of 1 kg depend on the posture: they are taken anew in each step
+    # the torques of 1 kg depend on the posture: they are computed anew in each step
     if steady[0] and _still_explains(state.lasting, residual, x[:, -1].copy(), J, S, sample.moving[0]):
         steady[0] += int(counts)
     else:  # something else, or nothing: the count starts again
@@ -246,10 +245,10 @@ def follow_lasting(
         return
     lasting = np.empty(3 + n)
     if not find_lasting(means, x, model.weights, J, numbers.p.offset_prior_nm, lasting):
-        # what has lasted may be unexplained for a while; for too long it is a person
+        # a residual may be unexplained for a while; for too long it is a person
         steady[0] = steady[0] if steady[0] <= 2 * numbers.settle else 0
     elif steady[0] > numbers.settle:
-        # found once more at the end, when it is learnt: a load that came slowly was less at the beginning
+        # estimated once more at the end, when it is learnt: a slow load was smaller at the beginning
         _learn_lasting(lasting, residual, x, S, model, numbers.prior)
         steady[0] = -1
     else:

@@ -1,7 +1,7 @@
-"""How free motion is learnt: blocks of calm samples, recursive least squares, and what is wrong where the arm turns.
+"""Learning of free motion: blocks of calm samples, recursive least squares, and the errors at hard accelerations.
 
-Samples are learnt in blocks, as their sums. What is learnt waits in a queue of blocks for `QUEUE` of them, and the
-queue is emptied when a contact is suspected: the beginning of a contact is never learnt.
+Samples are learnt in blocks, as their sums. A block waits in a queue until `QUEUE` more are full, and a suspected
+contact empties the queue: the beginning of a contact is never learnt.
 """
 
 import numpy as np
@@ -26,10 +26,10 @@ from pretouch.types import FloatArray
 def least_squares_step(
     w: FloatArray, P: FloatArray, x: FloatArray, y: float, noise: float, prior: FloatArray, forget: float
 ) -> None:
-    """Take one sample y = w . x + noise into the weights w (f,) and their covariance P (f, f), in place.
+    """Update the weights w (f,) and their covariance P (f, f) by one sample y = w . x + noise, in place.
 
     Recursive least squares; then P moves by the part `forget` towards the prior's diagonal, so that it stays between
-    nothing and the prior whatever is or is not excited (stabilised forgetting, Kulhavy and Zarrop 1993).
+    zero and the prior with any excitation (stabilised forgetting, Kulhavy and Zarrop 1993).
     """
     f, gain = len(w), np.zeros(len(w))
     total, error = noise, y
@@ -52,8 +52,8 @@ def add_to_block(model: ResidualModel, sample: FreeSample, ratio: FloatArray, p:
 
     With e = M v + d, of spread S = M A M^T + D, the sample's expectation of v_i^2 is (A M^T S^-1 e)_i^2 + A_i -
     A_i^2 (M^T S^-1 M)_ii, and that of d_i^2 alike with 1 in the place of M. The variance of the mean's error is in the
-    sample but not in D. `ratio` (n,) is how many samples in a row say as much of the mean as one would of white noise;
-    (0,): noise is white.
+    sample but not in D. `ratio` (n,) is the number of successive samples with as much information on the mean as one of
+    white noise; (0,): noise is white.
     """
     block, spread, variance = model.block, model.spread[sample.moving[0]], sample.model_variance
     (n, f), floor = sample.x.shape, p.noise_floor_nm
@@ -80,16 +80,16 @@ def add_to_block(model: ResidualModel, sample: FreeSample, ratio: FloatArray, p:
         jitter = trust * (D * z[i]) ** 2 + D - D * D * forward(L, unit, y)
         unit[i] = 0.0
         block[start + n + i] += max(jitter - variance[i] - floor**2, 0.0)
-        # an outlier counts less, and what stays the same for many samples is one piece of news
+        # an outlier counts less, and an error that lasts for many samples counts as one sample
         block[start + 2 * n + i] += S[i, i] / trust * max(1.0, ratio[i]) if len(ratio) else S[i, i]
     block[-2] += 1.0
-    block[-1] = sample.moving[0]  # a block is of the kind of its last sample
+    block[-1] = sample.moving[0]  # a block has the kind of its last sample
 
 
 @kernel
 def queue_block(model: ResidualModel, numbers: SequentialNumbers) -> None:
-    """Count a sample of the block; let a block that is full wait, and learn the one that has waited longest."""
-    # A contact that begins slowly is suspected late. By then its first samples are in the queue, which is thrown away.
+    """Count a sample of the block; queue a full block, and learn the oldest one of a full queue."""
+    # A slow contact is suspected late. By then its first samples are in the queue, which is then emptied.
     queue = model.queue
     model.filled[0] += 1
     if model.filled[0] < BLOCK:
@@ -107,27 +107,27 @@ def queue_block(model: ResidualModel, numbers: SequentialNumbers) -> None:
 _FIRST_S = 2.0
 """Time that the prior of the noise counts for [s]."""
 _CEILING = 4.0
-"""Times the prior that the noise's standard deviations may grow to."""
+"""Largest standard deviation of the noise, as a factor on its prior."""
 
 
 @kernel
 def learn_block(block: FloatArray, model: ResidualModel, numbers: SequentialNumbers) -> None:
     """Learn a block of samples: weights by their mean torques and features, and one step of both variances."""
-    p, period, weights, seen = numbers.p, numbers.period, model.weights, model.seen
+    p, period, weights, learnt = numbers.p, numbers.period, model.weights, model.seen
     n, f = weights.shape
     x, samples, start, k = np.empty(f), block[-2], n + n * f, int(block[-1])
     if samples <= 0.0:
         return
-    # the part by which a block's time fades what was learnt of the mean
+    # the part of the mean's knowledge that fades in the time of a block
     forget = BLOCK * period / p.memory_s
     for j in range(n):
         for a in range(f):
             x[a] = block[n + j * f + a] / samples
         noise = block[start + 2 * n + j] / samples**2  # of a mean: the sum of variances / N^2
         least_squares_step(weights[j], model.covariance[j], x, block[j] / samples, noise, numbers.prior, forget)
-    seen[k] += samples
+    learnt[k] += samples
     # a mean with the prior, then an exponential one
-    gain = max(samples / (_FIRST_S / period + seen[k]), BLOCK * period / p.spread_memory_s)
+    gain = max(samples / (_FIRST_S / period + learnt[k]), BLOCK * period / p.spread_memory_s)
     for part in range(2):
         ceiling = (_CEILING * (p.torque_prior_nm if part else p.velocity_prior_rad_s2)) ** 2
         for j in range(n):
@@ -137,24 +137,24 @@ def learn_block(block: FloatArray, model: ResidualModel, numbers: SequentialNumb
 
 
 _MOST = 1.0
-"""Largest factor: nothing is known of what accelerates."""
+"""Largest factor: the torque of the acceleration is unknown."""
 _WINDOW = 2
 _SAMPLES = LENGTHS[_WINDOW]
-"""The window whose means say how large the factor is [samples]."""
+"""Length of the window whose means determine the factor [samples]."""
 _FALL = 0.2
-"""How much less what is smaller than expected counts: what comes too early or too late is large only for some samples,
+"""Weight of a smaller square than expected: a torque that comes too early or too late is large only for some samples,
 and an expectile above the mean covers these (asymmetric least squares, Newey and Powell 1987)."""
 _OUTLIER = 9.0
-"""Times the expected square that a mean counts at most."""
+"""Largest square of a mean, as a factor on the expected one."""
 _LEAST_NM2 = 0.05
-"""Hard acceleration from which something is learnt of it [Nm^2]."""
+"""Hard acceleration from which the factor is learnt [Nm^2]."""
 
 
 @kernel
 def learn_turning(at: int, means: WindowMeans, forget: float, turning: FloatArray) -> None:
-    """Learn the factors of `turning_init` from how far the means lie beyond what is expected of them.
+    """Learn the factors of `turning_init` from the excess of the means over their expected size.
 
-    `at` counts the samples: no sample is in two of the means. `forget` is the part by which one sample's time fades.
+    `at` counts the samples: no sample is in two of the means. `forget` is the part that fades in the time of a sample.
     """
     if at % _SAMPLES:
         return

@@ -1,8 +1,8 @@
-"""Where a contact is, from the torques that free motion does not explain, with what the skin sees as a prior.
+"""Localisation of a contact by the torques that free motion does not explain, with the skin's view as a prior.
 
-Candidate points on the arm's surface (`robot.body`) are weighed by how well a force there that pushes inwards
-explains the torques, times how likely a contact is there beforehand (`posterior`). The state is the contact so far:
-what earlier steps said of each candidate. In free motion nothing runs.
+Candidate points on the arm's surface (`robot.body`) have as weights the likelihood of the torques under a force there
+that pushes inwards, times the prior of a contact there (`posterior`). The state is the contact so far: the likelihoods
+of earlier steps. In free motion nothing runs.
 """
 
 import math
@@ -25,14 +25,14 @@ from pretouch.values import value
 
 
 def _independent_part(period: float, p: LocalisationParams) -> float:
-    """Part of a sample, one a period [s], whose noise is not that of the samples before."""
+    """Return the part of a sample, one a period [s], with noise independent of the samples before."""
     return min(1.0, period / p.independent_s)
 
 
 def most_significant_mean(
     tested: SampleTest, period: float, p: LocalisationParams
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Return the mean (n,) that stands out most [Nm], and its covariance (n, n) in free motion [Nm^2].
+    """Return the most significant mean (n,) [Nm], and its covariance (n, n) in free motion [Nm^2].
 
     None where the covariance is not positive definite, or there are no samples.
     """
@@ -43,10 +43,10 @@ def most_significant_mean(
 
 @compiled
 def _most_significant(tested: SampleTest, independent: float, relative: float, S: FloatArray) -> tuple[int, float]:
-    """Return the window with the largest z^T S^-1 z of its mean z, and that value; -1 where there is none.
+    """Return the window with the largest z^T S^-1 z of its mean z, and that value; -1 without one.
 
-    `independent` is the part of a sample that says something new. `S` (n, n) is written: the covariance of that mean,
-    with an error of the part `relative` of each joint's torque.
+    `independent` is the independent part of a sample. `S` (n, n) is written: the covariance of that mean, with an error
+    of the part `relative` of each joint's torque.
     """
     # z^T S^-1 z grows with the window while the torques last, and falls once it holds samples from before the contact
     n = len(tested.model_variance)
@@ -54,7 +54,7 @@ def _most_significant(tested: SampleTest, independent: float, relative: float, S
     for k in range(len(LENGTHS)):
         if LENGTHS[k] > tested.samples[0]:
             break
-        # without the relative error, which would make every large mean stand out alike
+        # without the relative error, which would make all large means equally significant
         _covariance_of_mean(tested, k, independent, 0.0, S)
         if factor(S, L):
             square = forward(L, tested.means[k], y)
@@ -71,7 +71,7 @@ def _covariance_of_mean(tested: SampleTest, k: int, independent: float, relative
 
     The noise C averages out over N independent samples, the model's variance U does not; windows hold C + U.
     """
-    # samples that follow each other closely have the same noise in part: so many of them say something new
+    # successive samples share a part of their noise: the number of independent ones
     samples = max(1.0, independent * LENGTHS[k])
     mean, variance = tested.means[k], tested.model_variance
     for i in range(len(mean)):
@@ -81,24 +81,24 @@ def _covariance_of_mean(tested: SampleTest, k: int, independent: float, relative
 
 
 _OVER = 0.5
-"""Normalised log-likelihood ratio below which a contact is over: a gap to 1, at which it begins, so that noise does not
-end it."""
+"""Normalised log-likelihood ratio below which a contact is over: less than 1, at which it begins, so that noise does
+not end it."""
 
 
 @value
 class LocalisationState:
-    """The contact so far. Recordings keep these names."""
+    """The contact so far. Recordings store these names."""
 
     ln: FloatArray
     """(N,) log-likelihood of each candidate, averaged over the steps of this contact; (0,) without a contact."""
     weight: float
-    """How much that average stands on."""
+    """Weight of that average."""
     steps: int
     """Inferences since the contact began."""
     since: float
-    """Time since the last one [s]."""
+    """Time since the last inference [s]."""
     touched: Touched
-    """Its result."""
+    """Result of the last inference."""
 
 
 NO_CONTACT = LocalisationState(np.zeros(0), 0.0, 0, 0.0, NOT_TOUCHED)
@@ -107,9 +107,9 @@ NO_CONTACT = LocalisationState(np.zeros(0), 0.0, 0, 0.0, NOT_TOUCHED)
 def localise(
     state: LocalisationState, body: Body, sample: Sample, cues: Cues, tested: SampleTest, p: LocalisationParams
 ) -> LocalisationState:
-    """Return the contact so far, with the sample taken in; none without a detection.
+    """Return the contact so far, updated by a sample; none without a detection.
 
-    `cues` are those of the sample, `tested` is what the sequential test says of it.
+    `cues` are those of the sample, `tested` is the sequential test's result for it.
     """
     model, qd, ratio = body.model, sample.robot.qd_commanded, float(tested.log_likelihood_ratio[0])
     if ratio < (1.0 if state.steps == 0 else _OVER):
@@ -118,7 +118,7 @@ def localise(
     if state.steps and since < p.update_s * (1.0 - 1e-9):  # sums of periods are not exact
         return replace(state, since=since)
     s = model.surface
-    # the state is a value: what is written to is copied
+    # the state is a value: the average is a copy
     average = np.zeros(len(s.link)) if state.steps == 0 else state.ln.copy()
     touched = Touched(np.empty(1, np.int64), np.empty((1, 3)), np.empty((1, 3)), np.empty(1), np.empty(1))
     fading = math.exp(-max(since, body.period) / p.memory_s) if p.memory_s > 0.0 else 0.0
@@ -127,11 +127,9 @@ def localise(
     steady, fastest = int(tested.samples[0]), float(np.abs(qd).max())
     if fastest * steady * body.period > 2.0 * p.relative:
         steady = int(2.0 * p.relative / (fastest * body.period)) + 1
-    weight = _infer(
-        sample.kin, (model.moved_by, model.rigid, s, model.capsules),
-        tested._replace(samples=np.array([steady])), sample.obstacles, cues, p.numbers,
-        (average, fading * state.weight, _independent_part(body.period, p)), touched,
-    )  # fmt: skip
+    arm, so_far = (model.moved_by, model.rigid, s, model.capsules), (average, fading * state.weight)
+    tested, independent = tested._replace(samples=np.array([steady])), _independent_part(body.period, p)
+    weight = _infer(sample.kin, arm, (tested, independent), sample.obstacles, cues, p.numbers, so_far, touched)
     return NO_CONTACT if weight < 0.0 else LocalisationState(average, weight, state.steps + 1, 0.0, touched)
 
 
@@ -150,7 +148,7 @@ def candidate_poses(kin: Kinematics, surface: Surface, point: FloatArray, normal
 def hidden_candidates(
     point: FloatArray, body: IntArray, capsules: Capsules, capsule_body: IntArray, hidden: BoolArray
 ) -> None:
-    """Write whether each point (N, 3) lies inside a capsule of another rigid body, so that nothing can touch it.
+    """Mark each point (N, 3) inside a capsule of another rigid body, where nothing can touch it.
 
     The capsules are in the base frame; `body` (N,) and `capsule_body` (C,) are the rigid bodies of points and capsules.
     """
@@ -165,30 +163,30 @@ def hidden_candidates(
 
 @entry
 def _infer(
-    kin: Kinematics, body: tuple[BoolArray, IntArray, Surface, Capsules], tested: SampleTest,
-    seen: Obstacles, cues: Cues, p: LocalisationParams, so_far: tuple[FloatArray, float, float], contact: Touched,
+    kin: Kinematics, arm: tuple[BoolArray, IntArray, Surface, Capsules], sample: tuple[SampleTest, float],
+    near: Obstacles, cues: Cues, p: LocalisationParams, so_far: tuple[FloatArray, float], contact: Touched,
 ) -> float:  # fmt: skip
-    """Write average and contact; return the weight of the average, -1 where nothing stands out.
+    """Write average and contact; return the weight of the average, -1 without a significant mean.
 
     Args:
         kin: posture.
-        body: which joints move a link (L, n), rigid body of each link (L,), surface and capsules.
-        tested: means of the newest residuals.
-        seen: what is near.
-        cues: what units say of a touch.
+        arm: joints that move each link (L, n), rigid body of each link (L,), surface and capsules.
+        sample: means of the newest residuals, and the independent part of a sample.
+        near: obstacles.
+        cues: of the touch sensors.
         p: parameters.
-        so_far: average of the contact so far (N,), what is left of its weight, and the part of a sample that is new.
+        so_far: average of the contact so far (N,), and its weight.
         contact: written.
     """
-    (moved_by, rigid, surface, capsules), (average, before, independent) = body, so_far
+    (moved_by, rigid, surface, capsules), (tested, independent), (average, before) = arm, sample, so_far
     n, count = len(kin.anchor), len(surface.link)
     point, normal, hidden = np.empty((count, 3)), np.empty((count, 3)), np.empty(count, np.bool_)
     candidate_poses(kin, surface, point, normal)
     hidden_candidates(point, surface.body, placed(capsules, kin), rigid[capsules.link], hidden)
     prior = np.empty(count)
-    log_prior(point, surface, hidden, seen, cues, p, prior)
+    log_prior(point, surface, hidden, near, cues, p, prior)
 
-    # the mean that stands out most, held against a force at each candidate
+    # the most significant mean, compared with a force at each candidate
     S = np.empty((n, n))
     window, square = _most_significant(tested, independent, p.relative, S)
     if window < 0:
@@ -197,7 +195,7 @@ def _infer(
     candidates = Candidates(tested.means[window], kin, moved_by, surface, point, normal, prior, p)
     if not log_posterior(S, candidates, ln, force):
         return -1.0
-    # likelihoods are averaged over the contact, each step by how far it stands out; the prior is that of this step
+    # likelihoods are averaged over the contact, each step weighted by its significance; the prior is of this step
     for c in range(count):
         average[c] = (before * average[c] + square * (ln[c] - prior[c])) / (before + square)
         ln[c] = average[c] + prior[c]

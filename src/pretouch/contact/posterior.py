@@ -1,13 +1,13 @@
-"""How likely a single contact is at each candidate point, and what that comes to: body, point, and their certainty.
+"""Posterior of a single contact over candidate points, and its summary: body, point, and their certainty.
 
-The prior is what is known before the torques are looked at. Then, with L the Cholesky factor of the torques' covariance
+The prior does not use the torques. For the likelihood, with L the Cholesky factor of the torques' covariance
 S, a force f at the point p of a rigid body makes the torques J^T f, which are linear in the wrench w = [f; m] at the
-body's origin o, m = (p - o) x f: tau = A w with A (n, 6) the same for all points of the body. All that a candidate
-needs is A^T S^-1 A and A^T S^-1 tau of its body, so that thousands of candidates cost little.
+body's origin o, m = (p - o) x f: tau = A w with A (n, 6) the same for all points of the body. A candidate needs
+only A^T S^-1 A and A^T S^-1 tau of its body, so that thousands of candidates cost little.
 
 The force pushes inwards. Across the normal it is Gaussian, mu times as large as along it in each direction; along it,
 its size has a wide prior. It is integrated out in closed form (Laplace), so that candidates are compared by marginal
-likelihood, not by the best fit: a point where any force explains nearly anything pays for it.
+likelihood, not by the best fit: that penalises a point where some force explains nearly any torques.
 """
 
 import math
@@ -24,21 +24,21 @@ from pretouch.robot.kinematics import Kinematics, jacobian_into, tangents_of
 from pretouch.types import BoolArray, FloatArray, Obstacles, Touched
 
 _NEVER = 1e-12
-"""Prior of what cannot be: its logarithm stays finite."""
+"""Prior of an impossible contact: its logarithm stays finite."""
 
 
 @kernel
 def log_prior(
-    point: FloatArray, surface: Surface, hidden: BoolArray, seen: Obstacles, cues: Cues,
+    point: FloatArray, surface: Surface, hidden: BoolArray, near: Obstacles, cues: Cues,
     p: LocalisationParams, ln: FloatArray,
 ) -> None:  # fmt: skip
     """Write ln of the prior (N,) of a contact at each candidate; all candidates together have probability 1.
 
     A mixture of three: contacts spread over the surface that is not hidden, times the units' gain of each link;
-    contacts by what is seen, normally distributed about the points that are, the nearer to the body the likelier;
-    contacts at touched units, spread by their own error. What no unit sees keeps its part.
+    contacts with obstacles, normally distributed about their points, and likelier near the body; contacts at touched
+    units, spread by their own error. Contacts that no unit sees keep their part.
     """
-    link, area, distance = surface.link, surface.area, seen.body_distance
+    link, area, distance = surface.link, surface.area, near.body_distance
     count, base, nearest = len(point), 0.0, 0.0
     weight, kernel, touched = np.zeros(count), np.empty(count), np.zeros(count)
     located = np.zeros(len(cues.gain), np.bool_)
@@ -49,25 +49,25 @@ def log_prior(
             located[cues.link[k]] = True
             for c in range(count):
                 touched[c] += kernel[c]
-    # A touch whose point is known counts by that point, and not once more by the gain of its link: the part that is
-    # left for a false touch would lie on that link too.
+    # A touch with a known point counts by that point, and not once more by the gain of its link: the part of the
+    # probability for a false touch would be on that link too.
     for c in range(count):
         if not hidden[c]:
             weight[c] = area[c] if located[link[c]] else area[c] * cues.gain[link[c]]
             base += weight[c]
     for c in range(count):
         weight[c] /= max(base, 1e-300)
-    # What is seen: a unit sees the side of what touches, so its points lie beside the contact by about `seen_m`. The
-    # nearest one says how much of the probability goes there, and all share it by their nearness.
-    by_seen = np.zeros(count)
+    # A unit sees the side of the touching object, so its points are beside the contact by about `seen_m`. The nearest
+    # obstacle determines their share of the probability, and all divide it by their nearness.
+    at_obstacles = np.zeros(count)
     for k in range(len(distance)):
         nearness = min(1.0, max(0.0, 1.0 - distance[k] / p.near_m))
-        if nearness > 0.0 and _normal_kernel(point, surface, hidden, -1, seen.point[k], p.seen_m, kernel):
+        if nearness > 0.0 and _normal_kernel(point, surface, hidden, -1, near.point[k], p.seen_m, kernel):
             nearest = max(nearest, nearness)
             for c in range(count):
-                by_seen[c] += nearness * kernel[c]
-    # touched units last: their share is of all, what is seen included
-    _mix(weight, by_seen, p.seen_share * nearest)
+                at_obstacles[c] += nearness * kernel[c]
+    # touched units last: their share is of all, obstacles included
+    _mix(weight, at_obstacles, p.seen_share * nearest)
     _mix(weight, touched, p.unit_share)
     for c in range(count):
         ln[c] = math.log(max(weight[c], _NEVER))
@@ -75,19 +75,18 @@ def log_prior(
 
 @kernel
 def _normal_kernel(
-    point: FloatArray, surface: Surface, hidden: BoolArray, only: int, mean: FloatArray, sigma: float,
-    out: FloatArray,
-) -> bool:  # fmt: skip
+    point: FloatArray, surface: Surface, hidden: BoolArray, only: int, mean: FloatArray, sigma: float, out: FloatArray
+) -> bool:
     """Write a normal distribution (N,) about a point (3,), over the candidates of one link if `only` is not -1.
 
-    Returns False where no candidate is near enough for a sum that can be divided by.
+    Returns False where no candidate is near enough for a sum above 0.
     """
     total = 0.0
     for c in range(len(point)):
         out[c] = 0.0
         if not hidden[c] and (only < 0 or surface.link[c] == only):
             x, y, z = point[c, 0] - mean[0], point[c, 1] - mean[1], point[c, 2] - mean[2]
-            # times the area that a candidate stands for: a density on the surface, however it is sampled
+            # times the area of the candidate: a density on the surface, independent of the sampling
             out[c] = surface.area[c] * math.exp(-0.5 * (x * x + y * y + z * z) / (sigma * sigma))
             total += out[c]
     if not total > 1e-30:
@@ -99,7 +98,7 @@ def _normal_kernel(
 
 @kernel
 def _mix(weight: FloatArray, kernels: FloatArray, share: float) -> None:
-    """Mix a share of other distributions (N,), added up, into weights (N,) whose sum is 1."""
+    """Mix a share of the sum of other distributions (N,) into weights (N,) whose sum is 1."""
     total = sum(kernels)
     if total > 0.0:
         for c in range(len(weight)):
@@ -107,11 +106,11 @@ def _mix(weight: FloatArray, kernels: FloatArray, share: float) -> None:
 
 
 _LEAST_N = 1.0
-"""Force along the normal below which the one across it is no longer made smaller [N]."""
+"""Force along the normal below which the one across it shrinks no further [N]."""
 
 
 class Candidates(NamedTuple):
-    """N points where a contact may be, and the torques it is to explain."""
+    """N possible points of a contact, and the torques that it has to explain."""
 
     torque: FloatArray
     """(n,) external torques less those of free motion [Nm]."""
@@ -122,7 +121,7 @@ class Candidates(NamedTuple):
     point: FloatArray
     """(N, 3) in the base frame [m]."""
     normal: FloatArray
-    """(N, 3) outwards there."""
+    """(N, 3) outward normals there."""
     log_prior: FloatArray
     """(N,) of a contact."""
     p: LocalisationParams
@@ -132,12 +131,12 @@ class Candidates(NamedTuple):
 def log_posterior(S: FloatArray, candidates: Candidates, ln: FloatArray, force: FloatArray) -> bool:
     """Write ln of prior times marginal likelihood (N,) of a contact at each candidate, and its likeliest force (N, 3).
 
-    Forces are in the base frame [N]. The values compare between covariances S (n, n) of the torques [Nm^2]. With
-    z^T S^-1 z = |L^-1 z|^2 and X what the force explains of it, Student's tails of nu degrees of freedom give
+    Forces are in the base frame [N]. The values are comparable between covariances S (n, n) of the torques [Nm^2]. With
+    z^T S^-1 z = |L^-1 z|^2 and X the part that the force explains, Student's tails of nu degrees of freedom give
 
         ln = ln prior - ln det L + ln of the force's freedom - (nu + n) / 2 ln(1 + (z^T S^-1 z - X) / nu).
 
-    Returns whether S is positive definite; else nothing is written.
+    Returns whether S is positive definite; otherwise nothing is written.
     """
     surface, p, kin, normal = candidates.surface, candidates.p, candidates.kin, candidates.normal
     position, link, first, n = kin.position, surface.link, surface.first, len(S)
@@ -151,13 +150,13 @@ def log_posterior(S: FloatArray, candidates: Candidates, ln: FloatArray, force: 
     for body in range(len(first) - 1):
         if first[body] == first[body + 1]:
             continue
-        # links that no joint separates are one body: any of them gives the origin
+        # links without a joint between them are one body: any of them gives the origin
         base = link[first[body]]
         _wrench_information(kin, candidates.moved_by[base], position[base], L, y, G, h)
         for c in range(first[body], first[body + 1]):
             for i in range(3):
                 lever[i] = candidates.point[c, i] - position[base, i]
-            # the directions of the force at this candidate, and what the best one along them explains
+            # the directions of the force at this candidate, and the part that the best force along them explains
             _unit_wrenches(normal[c], lever, u)
             explained, freedom = _likeliest_force(G, h, u, p.friction, p.force_n, a)
             rest = max(square - explained, 0.0)  # rounding may take it below 0
@@ -207,7 +206,7 @@ def _unit_wrenches(normal: FloatArray, lever: FloatArray, u: FloatArray) -> None
 def _likeliest_force(
     G: FloatArray, h: FloatArray, u: FloatArray, mu: float, largest: float, a: FloatArray
 ) -> tuple[float, float]:
-    """Write the parts (3,) along `u` of the likeliest force [N]; return what it explains and ln of its freedom.
+    """Write the components (3,) along `u` of the likeliest force [N]; return its explained part and ln of its freedom.
 
     With g = u G u^T, b = u h, F = `largest` and the prior's precision P = diag(1/F^2, 1/(mu a_0)^2, 1/(mu a_0)^2):
 
@@ -227,7 +226,7 @@ def _likeliest_force(
                 total += u[i, k] * part
             g[i, j] = total
             g[j, i] = total
-    # to begin with, the force that explains most if there is none across
+    # the start: the force that explains most without a component across
     size = b[0] / (g[0, 0] + 1.0 / largest**2)
     normal, across = 1.0 / largest**2, 0.0
     c00 = c10 = c11 = c20 = c21 = c22 = v0 = v1 = v2 = 0.0
@@ -250,14 +249,14 @@ def _likeliest_force(
     a[0] = size
     a[2] = (v1 - c21 * size) / c11
     a[1] = (v0 - c10 * a[2] - c20 * size) / c00
-    # v2 = a_0 / sigma_0: 2 Phi of it is the part of the distribution that pushes
+    # v2 = a_0 / sigma_0: 2 Phi of it is the part of the distribution with a push
     pushes = math.log(max(1.0 + math.erf(v2 / math.sqrt(2.0)), 1e-30))
     explained = v0 * v0 + v1 * v1 + v2 * v2
     return explained, pushes + 0.5 * math.log(normal) + math.log(across) - math.log(c00 * c11 * c22)
 
 
 _NEGLIGIBLE = 12.0
-"""Nats below the most likely candidate from which on a candidate is left out."""
+"""Nats below the most likely candidate from which a candidate is left out."""
 
 
 @kernel
@@ -285,7 +284,7 @@ def summarise(ln: FloatArray, candidates: Candidates, there: FloatArray, contact
         top = max(top, ln[c])
         for i in range(3):
             mean[i] += math.exp(ln[c] - most) / best * at[c, i]
-    # the mean may be near a side of the body that nothing speaks for: its normal and force are not taken
+    # the mean may be near an unlikely side of the body: its normal and force are not used
     nearest, least = first[body], np.inf
     for c in range(first[body], first[body + 1]):
         gap = (at[c, 0] - mean[0]) ** 2 + (at[c, 1] - mean[1]) ** 2 + (at[c, 2] - mean[2]) ** 2
@@ -297,7 +296,7 @@ def summarise(ln: FloatArray, candidates: Candidates, there: FloatArray, contact
     for i in range(3):
         contact.point[0, i] = mean[i] - above * normal[nearest, i]
         contact.force[0, i] = there[nearest, i]
-    # second moment about the reported point, not about the mean: the error of what is reported
+    # second moment about the reported point, not about the mean: the error of the report
     V = np.zeros((3, 3))
     for c in range(first[body], first[body + 1]):
         part = math.exp(ln[c] - most) / best

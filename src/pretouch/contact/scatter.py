@@ -1,22 +1,22 @@
-"""How means of free motion's residuals vary beyond white noise, the level of an alarm, and the force that is found.
+"""Scatter of free motion's residuals beyond white noise, the level of an alarm, and the detectable force.
 
-**Scatter.** What the features of free motion cannot express, friction with memory, a cable, a joint that rings, is the
-same for many samples in a row: means over longer windows have more of it than S / N + U says. So the scatter of each
-window's whitened means is learnt, with a prior at the identity, from all samples that nobody near can have caused. One
-that stands out counts less, by Student's weight, and never nothing: a sample that is suspected of a contact is not left
-out, for a scatter that leaves out what it does not expect shrinks until it expects nothing.
+**Scatter.** Errors that the features of free motion cannot express, such as friction with memory, a cable or a ringing
+joint, are the same for many successive samples: means over longer windows contain more of them than S / N + U. So the
+scatter of each window's whitened means is learnt, with a prior at the identity, from all samples without anybody near.
+An outlier has less weight, by Student's distribution, but never none, also with a suspected contact: a scatter that
+leaves out unexpected samples shrinks until it expects none.
 
-**The level** that ln R must pass is the proven bound, less what the arm's own free motion leaves it. Markov's
-inequality bounds how often R passes A in free motion that is as learnt (`sequential`). Of an arm whose free motion the
-model describes well, the largest ln R of a quarter of a second stay far below that, and of one that rings and sticks
-they do not. Maxima of many samples are Gumbel's (Fisher and Tippett 1928): two quantiles of them, followed online with
-nothing near, say from which level on one in so many hours lies above. The level is that, between the bound and
+**The level** that ln R must exceed is the proven bound, less the margin of the arm's own free motion. Markov's
+inequality bounds how often R exceeds A in free motion as learnt (`sequential`). For an arm with a good model of free
+motion, the largest ln R in a quarter of a second stay far below that; for an arm that rings and sticks they do not.
+Maxima of many samples have Gumbel's distribution (Fisher and Tippett 1928): two of their quantiles, updated online with
+nothing near, give the level that one maximum in a number of hours exceeds. The level is between the bound and
 `slack_nats` below it: neither a person's touches nor a year of alarms can raise it further.
 
-**The force** at the end-effector that is found says in newtons how well free motion is known. A force f there adds
-J^T f to the mean z of a window, and so f^T G f with G = J S^-1 J^T to z^T S^-1 z. Solved for the likelihood ratio of an
-alarm, this gives the force: of all its directions the one in which the torques tell least of it. Evidence by something
-near, by a touch or by other windows comes on top.
+**The detectable force** at the end-effector measures the model of free motion in newtons. A force f there adds J^T f to
+the mean z of a window, and so f^T G f with G = J S^-1 J^T to z^T S^-1 z. Solved for the likelihood ratio of an alarm,
+this gives the force, in the direction where the torques are least sensitive. Evidence by an obstacle, by a touch or by
+other windows is not included.
 """
 
 import math
@@ -34,42 +34,42 @@ LONGEST = LENGTHS[-1]
 
 
 class WindowMeans(NamedTuple):
-    """Means of the newest residuals over windows of each of `LENGTHS`, and what they are in free motion."""
+    """Means of the newest residuals over windows of each of `LENGTHS`, and their distribution in free motion."""
 
     mean: FloatArray
     """(6, n) [Nm]."""
     whole: int
-    """How many of the windows are full."""
+    """Number of full windows."""
     S: FloatArray
     """(n, n) spread of a sample [Nm^2]."""
     model_variance: FloatArray
     """(n,) variance of the error of their mean [Nm^2]: it does not average out."""
     scatter: FloatArray
-    """(6, n + 2, n) how much more each window's means vary, see `scatter_init`; (0, ...): not at all, and nothing below
-    is written."""
+    """(6, n + 2, n) scatter of each window's means, see `scatter_init`; (0, ...): none, and the fields below are not
+    written."""
     whitened: FloatArray
     """(6, n) written: each window's mean, whitened by all but its scatter."""
     square: FloatArray
-    """(6,) written: how far it stands out."""
+    """(6,) written: square of its whitened mean, with the scatter."""
     ratio: FloatArray
     """(6, n) written: the square of each joint's mean, over its variance by all but the scatter."""
 
 
 REGIMES = 2
-"""At rest in a posture that is learnt, and else: each with a scatter of its own."""
+"""Regimes with a scatter of their own: at rest in a learnt posture, and otherwise."""
 _PRIOR = 20.0
-"""Means that the prior counts for."""
+"""Weight of the prior, as a number of means."""
 _LEAST = 0.5
-"""Least scatter, of what is quieter than the model says."""
+"""Least scatter, for residuals that are quieter than in the model."""
 _LEAST_STRIDE = 8
-"""Samples from one mean that is learnt to the next, of windows that are shorter."""
+"""Samples from one mean to the next, for shorter windows."""
 
 
 def scatter_init(n: int) -> FloatArray:
-    """Return the scatters (REGIMES, 6, n + 2, n) of an arm that has learnt nothing.
+    """Return the scatters (REGIMES, 6, n + 2, n) before the first sample.
 
-    Each is (n, n) in the order of `judge`, the last joint first. Below it are the number of means learnt, and (n,) how
-    much more each joint's mean varies by itself, the first joint first.
+    Each is (n, n) in the order of `judge`, the last joint first. Below it are the number of means, and (n,) the scatter
+    of each joint's mean alone, the first joint first.
     """
     scatter = np.zeros((REGIMES, len(LENGTHS), n + 2, n))
     scatter[:, :, :n] = np.eye(n)
@@ -81,7 +81,7 @@ def scatter_init(n: int) -> FloatArray:
 def means_in_free_motion(
     mean: FloatArray, whole: int, S: FloatArray, model_variance: FloatArray, scatter: FloatArray
 ) -> WindowMeans:
-    """Return means of residuals with what they are in free motion, and room for how both compare."""
+    """Return means of residuals with their distribution in free motion, and arrays for the comparison."""
     size, n = len(scatter), len(S)
     return WindowMeans(
         mean, whole, S, model_variance, scatter, np.zeros((size, n)), np.zeros(size), np.zeros((size, n))
@@ -90,9 +90,9 @@ def means_in_free_motion(
 
 @kernel
 def covariance_of_mean(means: WindowMeans, k: int, S0: FloatArray) -> None:
-    """Write the lower triangle of the covariance (n, n) of window k's mean, the last joint first, but for its scatter.
+    """Write the lower triangle of the covariance (n, n) of window k's mean, the last joint first, without its scatter.
 
-    What the joints behind a link say is so the beginning of a whitened mean.
+    So the joints behind a link are the beginning of a whitened mean.
     """
     n = len(S0)
     for i in range(n):
@@ -104,12 +104,12 @@ def covariance_of_mean(means: WindowMeans, k: int, S0: FloatArray) -> None:
 
 @kernel
 def learn_scatter(at: int, means: WindowMeans, tails: float, forget: float) -> None:
-    """Learn from the means of full windows; `at` counts samples, each fades by the part `forget` in its time."""
+    """Learn from the means of full windows; `at` counts samples, `forget` is the part that fades with each."""
     scatter, whitened, square, ratio = means.scatter, means.whitened, means.square, means.ratio
     n = whitened.shape[1]
     for k in range(means.whole):
         stride = max(LENGTHS[k], _LEAST_STRIDE)
-        # no sample is in two means of a long window: those that overlap would say the same twice
+        # no sample is in two means of a long window: overlapping means would count twice
         if at % stride:
             continue
         trust = (tails + n) / (tails + square[k])
@@ -124,10 +124,10 @@ def learn_scatter(at: int, means: WindowMeans, tails: float, forget: float) -> N
 
 @kernel
 def spread_out(scatter: FloatArray, L: FloatArray, K: FloatArray) -> None:
-    """Turn L (n, n), the factor of what white noise would be, into that with the scatter (n + 2, n), in place.
+    """Turn L (n, n), the factor for white noise, into that with the scatter (n + 2, n), in place.
 
-    L K has the covariance L (K K^T) L^T. `K` (n, n) is written: the factor of the scatter, no part below `_LEAST`, for
-    what seems quieter than expected may only not have been seen yet.
+    L K has the covariance L (K K^T) L^T. `K` (n, n) is written: the factor of the scatter, with no part below `_LEAST`,
+    because quiet residuals may only be too few yet.
     """
     n = len(L)
     C = scatter[:n].copy()
@@ -149,9 +149,9 @@ def spread_out(scatter: FloatArray, L: FloatArray, K: FloatArray) -> None:
 
 @kernel
 def window_means(ring: FloatArray, at: int, count: int, means: FloatArray) -> int:
-    """Write the means (6, n) of the newest 1, 2, ... 32 samples of a ring, and return how many of them are whole.
+    """Write the means (6, n) of the newest 1, 2, ... 32 samples of a ring, and return the number of full windows.
 
-    `at` is where the next sample goes, `count` how many there are.
+    `at` is the index of the next sample, `count` the number of samples.
     """
     size, n = ring.shape
     total = np.zeros(n)
@@ -159,7 +159,7 @@ def window_means(ring: FloatArray, at: int, count: int, means: FloatArray) -> in
     for k in range(len(LENGTHS)):
         if LENGTHS[k] > count:
             break
-        # a longer window goes on with the sum of the shorter one
+        # a longer window continues the sum of the shorter one
         while samples < LENGTHS[k]:
             samples += 1
             for j in range(n):
@@ -171,86 +171,86 @@ def window_means(ring: FloatArray, at: int, count: int, means: FloatArray) -> in
 
 
 MAXIMUM_OF = 25
-"""Samples of which one maximum is taken."""
+"""Samples for one maximum."""
 _MIDDLE, _HIGH = 0.8, 0.98
-"""Parts of the maxima that lie below both quantiles. Lower ones say nothing of the tail: arms that stick and ring
-differ from others in one maximum of fifty. Touches that no unit sees raise the level too, to the bound at most."""
+"""Parts of the maxima below both quantiles. Lower ones say nothing about the tail: arms that stick and ring differ from
+others in one maximum of fifty. Touches that no unit sees raise the level too, to the bound at most."""
 _FIRST = (0.5, 2.5)
-"""Both quantiles before anything is known: the level begins 5 nats below the bound. With all of `slack_nats` a real arm
-that shook gave twice as many alarms in its first minute, and at the bound one sample of 60 N could be missed."""
+"""Initial quantiles: the level begins 5 nats below the bound. With all of `slack_nats` a shaking real arm gave twice as
+many alarms in its first minute, and at the bound the test could miss one sample of 60 N."""
 _PRIOR_MAXIMA, _MEMORY = 40.0, 600.0
-"""Maxima that the first values count for, and over which the quantiles are averaged at most."""
+"""Weight of the initial values, and largest length of the quantiles' average [maxima]."""
 _STEP, _STEP_HIGH = 4.0, 20.0
-"""How far one maximum moves each quantile, relative to their distance and the average's weight."""
+"""Step of each quantile by one maximum, relative to their distance and the average's weight."""
 _LEAST_APART = 0.5
-"""Least distance of the quantiles: with less they would stand still."""
+"""Least distance of the quantiles: with less they would not move."""
 _HEAVIER = 1.0
-"""Scales that are added: the maxima are a mixture of speeds and postures, whose tail is heavier than its middle."""
+"""Scales added to the level: the maxima are a mixture of speeds and postures, with a heavier tail than its middle."""
 _GUMBEL_MIDDLE, _GUMBEL_HIGH = -math.log(-math.log(_MIDDLE)), -math.log(-math.log(_HIGH))
 """Both quantiles of the standard Gumbel distribution."""
 
 
 def level_init() -> FloatArray:
-    """Return the (REGIMES, 5) memory of an arm of which nothing is known.
+    """Return the (REGIMES, 5) memory before the first sample.
 
-    Of each regime both quantiles, the largest ln R of the block so far, samples in it, and blocks seen.
+    For each regime: both quantiles, the largest ln R of the present block, its samples, and the number of blocks.
     """
     return np.tile([*_FIRST, -np.inf, 0.0, 0.0], (REGIMES, 1))
 
 
 @kernel
-def earned_level(seen: FloatArray, bound: float, slack: float) -> float:
+def earned_level(maxima: FloatArray, bound: float, slack: float) -> float:
     """Return the level for one alarm in exp(`bound`) samples, from `bound` - `slack` to `bound` (both at least 1)."""
     # both quantiles of Gumbel's distribution give its scale and its location
-    scale = max(seen[1] - seen[0], _LEAST_APART) / (_GUMBEL_HIGH - _GUMBEL_MIDDLE)
-    location = seen[0] - scale * _GUMBEL_MIDDLE
+    scale = max(maxima[1] - maxima[0], _LEAST_APART) / (_GUMBEL_HIGH - _GUMBEL_MIDDLE)
+    location = maxima[0] - scale * _GUMBEL_MIDDLE
     # P(maximum > x) is about exp(-(x - location) / scale) far out
     level = location + scale * (_HEAVIER + bound - math.log(MAXIMUM_OF))
     return max(1.0, min(max(level, bound - slack), bound))
 
 
 @kernel
-def learn_level(log_r: float, seen: FloatArray) -> None:
-    """Take in one sample of free motion of a regime (5,)."""
-    seen[2], seen[3] = max(seen[2], log_r), seen[3] + 1.0
-    if seen[3] < MAXIMUM_OF:
+def learn_level(log_r: float, maxima: FloatArray) -> None:
+    """Add one sample of free motion to the memory of its regime (5,)."""
+    maxima[2], maxima[3] = max(maxima[2], log_r), maxima[3] + 1.0
+    if maxima[3] < MAXIMUM_OF:
         return
-    step = max(seen[1] - seen[0], _LEAST_APART) / min(_PRIOR_MAXIMA + seen[4], _MEMORY)
-    # stochastic approximation: at rest where the part above each is as it should be (Robbins and Monro 1951)
-    seen[0] += _STEP * step * ((seen[2] > seen[0]) - (1.0 - _MIDDLE))
-    seen[1] += _STEP_HIGH * step * ((seen[2] > seen[1]) - (1.0 - _HIGH))
-    seen[1] = max(seen[1], seen[0] + _LEAST_APART)
-    seen[2], seen[3], seen[4] = -np.inf, 0.0, seen[4] + 1.0
+    step = max(maxima[1] - maxima[0], _LEAST_APART) / min(_PRIOR_MAXIMA + maxima[4], _MEMORY)
+    # stochastic approximation: stationary where the part above each is right (Robbins and Monro 1951)
+    maxima[0] += _STEP * step * ((maxima[2] > maxima[0]) - (1.0 - _MIDDLE))
+    maxima[1] += _STEP_HIGH * step * ((maxima[2] > maxima[1]) - (1.0 - _HIGH))
+    maxima[1] = max(maxima[1], maxima[0] + _LEAST_APART)
+    maxima[2], maxima[3], maxima[4] = -np.inf, 0.0, maxima[4] + 1.0
 
 
 HELD_S = 0.1
-"""For how long the force is there [s]."""
+"""Duration of the force [s]."""
 _SURE = 1.645
-"""Deviations of the noise above what would do in half of all cases: so that it does in 95 % of them."""
+"""Deviations of the noise above the force for half of all cases: the force for 95 % of them."""
 
 
 @kernel
 def detectable_force(
     J: FloatArray, period: float, means: WindowMeans, needed: float, gain: float, tails: float
 ) -> float:
-    """Return the force at the end-effector that the test finds in 95 of 100 cases if it is held for `HELD_S` [N].
+    """Return the force at the end-effector that the test detects in 95 of 100 cases if it lasts for `HELD_S` [N].
 
     Args:
         J: (6, n) Jacobian of the end-effector.
         period: of control [s].
-        means: of residuals, and what they are in free motion; the longest window within `HELD_S` counts.
-        needed: ln of the likelihood ratio of one hypothesis in one window that is an alarm.
-        gain: g, how much larger a contact's spread is than that of free motion.
+        means: of residuals, with their distribution in free motion; the longest window within `HELD_S` counts.
+        needed: ln of the likelihood ratio of one hypothesis in one window for an alarm.
+        gain: g, ratio of a contact's spread to that of free motion.
         tails: degrees of freedom of the Student distribution.
 
     Returns:
-        Infinite where no force is found.
+        Infinite if no force is detected.
     """
     k, n = 0, J.shape[1]
     while k + 1 < len(LENGTHS) and LENGTHS[k + 1] * period <= HELD_S:
         k += 1
     S, L, A, V = np.empty((n, n)), np.zeros((n, n)), np.empty((3, n)), np.zeros((3, 3))
-    # a mean over less time has more noise, and one over more is not whole while the force lasts
+    # a shorter mean has more noise, and a longer window is not full while the force lasts
     covariance_of_mean(means, k, S)
     if not factor(S, L):
         return np.inf
@@ -268,7 +268,7 @@ def detectable_force(
 
 @kernel
 def _squares(needed: float, n: int, gain: float, tails: float) -> float:
-    """Return the f^T G f from which on the mean's likelihood ratio passes exp(`needed`).
+    """Return the f^T G f from which the mean's likelihood ratio exceeds exp(`needed`).
 
     With c = g / (1 + g), z^T S^-1 z = T + n of which the force explains T + 3, the ratio of `log_ratio` has the root
     E = exp(2 (needed + 3/2 ln(1 + g)) / (nu + n)) = (nu + n + T) / (nu + n - 3 c + (1 - c) T), which is linear in T.

@@ -1,16 +1,15 @@
-"""A sequential test for a contact: a bank of windows, each held against forces on each link.
+"""A sequential test for a contact: a bank of windows, each compared with forces on each link.
 
 The statistic is Shiryaev's and Roberts', R = sum of prior weights times likelihood ratios, over the links that may be
-touched and the instants at which it may have begun, of which those 1, 2, 4, ... 32 samples ago are kept. In free motion
-its expectation is the sum of the weights, so that it passes A with a probability of at most sum / A a sample (Markov).
+touched and the instants at which it may have begun, namely 1, 2, 4, ... 32 samples ago. In free motion its
+expectation is the sum of the weights, so that it exceeds A with a probability of at most sum / A a sample (Markov).
 The force of a contact is unknown, and integrated out in closed form with a Gaussian prior whose spread is g times that
-of free motion (Zellner 1986): so wide a prior as that of the forces that can be would cost a contact that only some
-joints measure what the others do not.
+of free motion (Zellner 1986): with a prior as wide as all possible forces, a contact that only some joints measure
+would lose evidence by the others.
 
-**Hypotheses** are contacts in one posture, and their priors. An object adds hypotheses, it takes none away: a force on
-the body's point nearest to it, away from it. How much they weigh depends on how soon it may touch. What no unit sees,
-or a unit whose reading is too old to be an obstacle, adds nothing, and all other contacts keep the weight they have
-without a skin.
+**Hypotheses** are contacts in one posture, and their priors. An object adds hypotheses and removes none: a force on the
+body's point nearest to it, away from it. Their weight depends on how soon it may touch. An object that no unit sees, or
+with a reading too old for an obstacle, adds nothing, and all other contacts keep the weight they have without a skin.
 """
 
 import math
@@ -26,7 +25,7 @@ from pretouch.robot.kinematics import Kinematics, Mechanism, jacobian_into, rota
 from pretouch.types import FloatArray, IntArray, Obstacles
 
 _LARGEST = 300.0
-"""Logarithm of a likelihood ratio from which on it is all the same."""
+"""Largest logarithm of a likelihood ratio."""
 _SMALLEST = 1e-300
 _SINGULAR = 1e-6
 """Part of its trace by which a force's information is made regular: a force along a joint's axis has none."""
@@ -39,7 +38,7 @@ def alarm_bound(p: SequentialParams, period: float) -> float:
 
 
 class Moment(NamedTuple):
-    """What one sample of the torques is of. n joints, L links."""
+    """Torques of one sample, with motion and surroundings of the arm. n joints, L links."""
 
     kin: Kinematics
     qd: FloatArray
@@ -47,40 +46,40 @@ class Moment(NamedTuple):
     qd_commanded: FloatArray
     """(n,) [rad/s]."""
     tau_ext: FloatArray
-    """(n,) external torques [Nm], which must be numbers."""
+    """(n,) external torques [Nm], without NaN."""
     obstacles: Obstacles
     touch_gain: FloatArray
-    """(L,) factor on the prior of a contact on each link, by what units say."""
+    """(L,) factor on the prior of a contact on each link, by the touch sensors."""
     watched: bool
-    """Whether a skin watches, all of it heard and none of it touched."""
+    """True if a skin watches: no unit is silent or touched."""
     reacting: bool
-    """Whether the arm moves with a contact."""
+    """True while the arm moves with a contact."""
 
 
 class Hypotheses(NamedTuple):
-    """The contacts that are looked for.
+    """The possible contacts.
 
-    The first n are torques on the joints before each link, of any wrench; the H others are forces at a point.
+    The first n are torques on the joints before each link, by any wrench; the H others are forces at a point.
     """
 
     J: FloatArray
     """(H, 3, n) Jacobians of the points."""
     joints: IntArray
-    """(H,) how many joints move each point."""
+    """(H,) number of joints that move each point."""
     weight: FloatArray
     """(n + H,) prior weights of all hypotheses, for all windows together."""
     away: FloatArray
-    """(H, 3) direction of the force where one is expected, zero where it may be any."""
+    """(H, 3) expected direction of the force, zero for any direction."""
 
 
 @kernel
 def judge(means: WindowMeans, contacts: Hypotheses, gain: float, tails: float) -> tuple[float, int, int]:
-    """Return ln R, and the window and the hypothesis that have the largest part in it.
+    """Return ln R, and the window and the hypothesis with the largest part in it.
 
     Args:
-        means: of residuals, and what they are in free motion.
+        means: of residuals, with their distribution in free motion.
         contacts: hypotheses.
-        gain: g, how much larger a contact's spread is than that of free motion.
+        gain: g, ratio of a contact's spread to that of free motion.
         tails: degrees of freedom of the Student distribution.
     """
     J, joints, weight, away = contacts
@@ -117,7 +116,7 @@ def judge(means: WindowMeans, contacts: Hypotheses, gain: float, tails: float) -
             if h >= n:
                 explained, one_sided = explained_by_force(L, pivot, y, J[h - n], joints[h - n], away[h - n], scratch)
             ratio = log_ratio(alone, square, explained, size, n, gain, widened, tails)
-            # the windows share the weight alike
+            # the windows share the weight equally
             part = weight[link] * np.exp(min(ratio, _LARGEST)) * one_sided / len(LENGTHS)
             total += part
             if part > best:
@@ -129,14 +128,14 @@ def judge(means: WindowMeans, contacts: Hypotheses, gain: float, tails: float) -
 def log_ratio(
     alone: float, square: float, explained: float, size: int, n: int, gain: float, widened: float, tails: float
 ) -> float:
-    """Logarithm of how much likelier a sample z (n,) is with a contact than in free motion.
+    """Return the logarithm of the likelihood ratio of a sample z (n,), with a contact over free motion.
 
     Free motion is Student's, of spread S and `tails` degrees of freedom; with a contact the spread is 1 + g times as
     large in the `size` directions it can push. `square` is z^T S^-1 z, `explained` the part of it in these directions;
     `alone` = ln(1 + square / tails) and `widened` = ln(1 + g) are the same for many contacts.
     With many degrees of freedom this is ((1 + g)^-size exp(g / (1 + g) explained))^(1/2).
     """
-    # in the directions of a contact the spread is 1 + g times as large: 1 / (1 + g) of what they explain is left
+    # in the directions of a contact the spread is 1 + g times as large: 1 / (1 + g) of their part is left
     rest = square - gain / (1.0 + gain) * explained
     return 0.5 * (tails + n) * (alone - np.log1p(rest / tails)) - 0.5 * size * widened
 
@@ -145,7 +144,7 @@ def log_ratio(
 def explained_by_force(
     L: FloatArray, pivot: FloatArray, y: FloatArray, J: FloatArray, joints: int, away: FloatArray, a: FloatArray
 ) -> tuple[float, float]:
-    """Part of y . y that a force at a point explains, and how much likelier it is that it points `away`, from 0 to 2.
+    """Return the part of y . y that a force at a point explains, and the factor for its direction `away`, from 0 to 2.
 
     `L` is the factor of S, `pivot` (n,) the inverse of its diagonal, and y = L^-1 z, the last joint first; `J` (3, n)
     the point's Jacobian, moved by the first so many joints. The second value is 1 where `away` (3,) is zero. `a` (n, 3)
@@ -190,12 +189,12 @@ def explained_by_force(
 
 
 MOST = 4
-"""Objects that are taken into account, the nearest ones."""
+"""Number of nearest objects that count."""
 
 
 @kernel
 def link_prior(mechanism: Mechanism) -> float:
-    """Return ln of the prior weight of a force on one link in one window, of which nothing near or touched is known."""
+    """Return ln of the prior weight of a force on one link in one window, without obstacles and touches."""
     return -math.log(2.0 * len(mechanism.links.parts) * len(LENGTHS))
 
 
@@ -203,8 +202,8 @@ def link_prior(mechanism: Mechanism) -> float:
 def hypotheses(now: Moment, mechanism: Mechanism, most: int, near: ProximityPriorParams) -> Hypotheses:
     """Return the hypotheses: any wrench beyond each joint, a force on each link, one by each of the nearest objects.
 
-    No more than so many objects count. All weights are times the touch gain of the link; of several links behind one
-    joint the largest counts.
+    At most `most` objects count. All weights are multiplied by the touch gain of the link; of several links behind one
+    joint the largest gain counts.
     """
     obstacles, touch_gain, qd = now.obstacles, now.touch_gain, now.qd
     position, rotation, anchor, axis = now.kin
@@ -214,11 +213,11 @@ def hypotheses(now: Moment, mechanism: Mechanism, most: int, near: ProximityPrio
     order, k = nearest_of(distance, most), 0
     size = count + len(order)
     J, joints, weight, away = np.empty((size, 3, n)), np.empty(size, np.int64), np.empty(n + size), np.zeros((size, 3))
-    # joints and links without what is seen share a weight of 1: half for any wrench on a link, which moves the joints
+    # joints and links share a weight of 1, without the objects: half for any wrench on a link, which moves the joints
     # before it, half for a force at the middle of a link
     weight[:n] = 0.0
     for body in range(len(moved_by)):
-        # in a serial chain the joints that move a link are the first so many, so their number says which
+        # in a serial chain the joints that move a link are the first ones, so their number determines them
         before = sum(moved_by[body])
         if before:
             weight[before - 1] = max(weight[before - 1], 0.5 / n * touch_gain[body])
@@ -247,10 +246,10 @@ def hypotheses(now: Moment, mechanism: Mechanism, most: int, near: ProximityPrio
 
 @kernel
 def nearness(distance: float, closing: float, near: float, horizon: float) -> float:
-    """How soon an object may touch, from 0 (not near) to 1 (touches within `horizon` [s]).
+    """Return the nearness of a touch, from 0 (not near) to 1 (touches within `horizon` [s]).
 
-    `distance` [m] is from the body's surface, `closing` [m/s] the speed at which it becomes less; a growing one counts
-    as it is.
+    `distance` [m] is from the body's surface, `closing` [m/s] the speed at which it shrinks; a growing distance counts
+    as constant.
     """
     ahead = distance - max(closing, 0.0) * horizon
     return min(max(1.0 - ahead / near, 0.0), 1.0)
@@ -258,7 +257,7 @@ def nearness(distance: float, closing: float, near: float, horizon: float) -> fl
 
 @kernel
 def nearest_of(distance: FloatArray, most: int) -> IntArray:
-    """Indices of the smallest distances (K,), at most so many, the nearest first."""
+    """Return the indices of the smallest distances (K,), at most `most` of them, the nearest first."""
     nearest, count = np.empty(min(most, len(distance)), np.int64), 0
     for k in range(len(distance) if len(nearest) else 0):
         i = min(count, len(nearest) - 1)
@@ -273,15 +272,15 @@ def nearest_of(distance: FloatArray, most: int) -> IntArray:
 
 
 _DAMPING = 0.02
-"""Damping d: below it a direction is singular, and the force in it is taken to be smaller than it may be."""
+"""Damping d: below it a direction is singular, and the force in it is underestimated."""
 
 
 @compiled
 def force_map_into(J: FloatArray, W: FloatArray) -> None:
     """Write the map (3, n) from joint torques [Nm] to the force at the end-effector that explains them best [N].
 
-    Damped least squares: the first three rows of (J J^T + d^2 I)^-1 J of the Jacobian (6, n). A force so found does
-    work on the arm's end in the direction in which the torques do work on the joints, wherever the contact is.
+    Damped least squares: the first three rows of (J J^T + d^2 I)^-1 J of the Jacobian (6, n). Such a force does work on
+    the end-effector in the direction in which the torques do work on the joints, wherever the contact is.
     """
     A, L, unit, y, x = np.empty((6, 6)), np.zeros((6, 6)), np.zeros(6), np.empty(6), np.empty(6)
     for i in range(6):

@@ -1,11 +1,11 @@
-"""Contact detection by a sequential test on the torques, which learns the arm's free motion as it goes."""
+"""Contact detection by a sequential test on the torques, which learns the arm's free motion online."""
 
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from pretouch.contact.announced_load import doubted
+from pretouch.contact.announced_load import widen_for_load
 from pretouch.contact.detector import Body, Detection, Detector, Sample, no_torques, strongest
 from pretouch.contact.localisation import NO_CONTACT, LocalisationState, localise, most_significant_mean
 from pretouch.contact.residual_model import ResidualModel, SequentialState, sequential_init, sequential_numbers
@@ -23,103 +23,101 @@ from pretouch.values import value
 
 @value
 class SequentialTestState:
-    """All that the sequential test remembers."""
+    """State of the sequential test."""
 
     test: SequentialState | None
-    """None where the controller keeps it."""
+    """None where the controller stores it."""
     localisation: LocalisationState | None
-    """None where no contact is localised."""
+    """None without localisation."""
     touched: FloatArray
-    """(M,) how long each of M touch sensors has said that it is touched, see `touch_cues` [s]."""
+    """(M,) time for which each of M touch sensors has reported a touch, see `touch_cues` [s]."""
 
 
 @dataclass(frozen=True)
 class SequentialTest(SequentialParams, Detector, name="sequential"):
-    """A test on the torques less their learnt mean in free motion (docs/explanation/detection.md)."""
+    """Test of the torques less their learnt mean in free motion (docs/explanation/detection.md)."""
 
     touch: TouchSensorParams | None = None
-    """How much the units' touch sensors count; none: nothing."""
+    """Weight of the units' touch sensors; none: they do not count."""
     localise: LocalisationParams | None = None
-    """How the place of a contact is inferred (docs/explanation/localization.md); None: it is not."""
+    """Localisation of contacts (docs/explanation/localization.md); none: no localisation."""
 
     State = SequentialTestState
 
     @property
     def reads_touch(self) -> bool:
-        """Whether touch sensors count."""
+        """True if touch sensors count."""
         return self.touch is not None
 
     def init(self, body: Body, learnt: ResidualModel | None = None) -> SequentialTestState:
-        """Return what is remembered before the first step."""
+        """Return the state before the first step."""
         test = sequential_init(body.model.n, self, learnt)
         return SequentialTestState(test, NO_CONTACT if self.localise else None, untouched(body, self.touch))
 
     def step(self, state: SequentialTestState, body: Body, sample: Sample) -> tuple[Detection, SequentialTestState]:
-        """Hold one sample of the torques against free motion, and learn from it if nothing can be a contact."""
+        """Compare one sample of the torques with free motion, and learn from it if no contact is possible."""
         location = state.localisation
-        # first, for units are heard without torques too: how long a sensor has been stuck counts on
+        # first, and without torques too: the time of a stuck sensor counts on
         cues, touched = touch_cues(state.touched, body, sample, self.touch)
         blind = no_torques(body, sample)
         if blind is not None:
             return blind, SequentialTestState(state.test, NO_CONTACT if location else None, touched)
         before = _test_of(state)
         if sample.doubted_kg:
-            before = before._replace(model=doubted(before.model, sample.doubted_kg))
-        tested, test = self._assessed(before, body, sample, cues)
+            before = before._replace(model=widen_for_load(before.model, sample.doubted_kg))
+        tested, test = self._assess(before, body, sample, cues)
         ratio, bands, significant = float(tested.log_likelihood_ratio[0]), Thresholds(*tested.bands), None
         if self.localise:
             location = localise(location or NO_CONTACT, body, sample, cues, tested, self.localise)
         if ratio >= 1.0:
             significant = most_significant_mean(tested, body.period, self.localise or _USUAL)
+        contact = strongest(tested.force, bands) if ratio >= 1.0 and sample.armed else None
+        lasting, detectable = bool(tested.lasting[0]), float(tested.detectable_n[0])
+        place = location.touched if self.localise and location else NOT_TOUCHED
         detection = Detection(
-            bands, strongest(tested.force, bands) if ratio >= 1.0 and sample.armed else None, sample.armed,
-            tested.residual, ratio, bool(tested.lasting[0]),
-            location.touched if self.localise and location else NOT_TOUCHED, significant,
-            float(tested.detectable_n[0]),
-        )  # fmt: skip
+            bands, contact, sample.armed, tested.residual, ratio, lasting, place, significant, detectable
+        )
         return detection, SequentialTestState(test, location if self.localise else None, touched)
 
-    def _assessed(
+    def _assess(
         self, state: SequentialState, body: Body, sample: Sample, cues: Cues
     ) -> tuple[SampleTest, SequentialState]:
-        """Return what a sample says, and the state after it."""
+        """Return the test of a sample, and the state after it."""
         robot, n = sample.robot, body.model.n
         results = zeros(SampleTest, n=n, W=len(LENGTHS))
-        # while a unit is touched free motion is not learnt, whatever the test says
+        # no learning of free motion while a unit is touched, whatever the test result
         watched = sample.watched and not len(cues.link)
         model = ResidualModel._make(part.copy() for part in state.model)
         after = SequentialState._make((model, *(part.copy() for part in state[1:])))
-        now = Moment(
-            sample.kin, robot.qd, robot.qd_commanded, robot.tau_ext, sample.obstacles, cues.gain, watched,
-            sample.reacting,
-        )  # fmt: skip
+        motion = sample.kin, robot.qd, robot.qd_commanded, robot.tau_ext
+        now = Moment(*motion, sample.obstacles, cues.gain, watched, sample.reacting)
         assess_sample(after, now, sequential_numbers(n, body.period, self), body.model.mechanism, results)
         return results, after
 
     def adopted(self, state: Any, body: Body, before: Detector) -> SequentialTestState:
-        """Go on from another sequential test's state; touch sensors that count otherwise begin anew."""
+        """Continue the state of another sequential test; touch sensors with other parameters start anew."""
         if not isinstance(before, SequentialTest):
             return self.init(body)
         return state if self.touch == before.touch else replace(state, touched=untouched(body, self.touch))
 
     def learnt(self, state: SequentialTestState) -> ResidualModel:
-        """Return what was learnt of free motion."""
+        """Return the model of free motion."""
         return _test_of(state).model
 
     def largest_missed_n(self, body: Body, speed: float) -> float:
-        """Force from which one sample is a contact to an arm at its ready posture that has learnt nothing.
+        """Return the force from which one sample is a contact, in the ready posture and before any learning.
 
-        By bisection; infinite where it would miss any force up to `_LARGEST_N`.
+        By bisection; infinite where the test misses any force up to `_LARGEST_N`.
         """
         model, q, qd = body.model, body.model.description.q_ready, np.full(body.model.n, speed)
         kin, fresh, cues = model.kinematics(q), sequential_init(model.n, self), no_cues(len(model.links))
-        # with the delayed velocities at the present ones nothing accelerates
+        # the delayed velocities equal the present ones: no acceleration
         state, J = fresh._replace(model=fresh.model._replace(speed=qd)), model.ee_jacobian(kin)[:3]
 
         def is_detected(force: FloatArray) -> bool:
             robot = RobotState(0.0, q, qd, q, qd, J.T @ force, None)
             sample = Sample(0.0, kin, robot, window_init(2), True, no_obstacles())
-            tested, _ = self._assessed(state, body, sample, cues)
+            tested, _ = self._assess(state, body, sample, cues)
             return bool(tested.log_likelihood_ratio[0] >= 1.0)
 
         largest = 0.0
@@ -136,11 +134,11 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
 
 def _test_of(state: SequentialTestState) -> SequentialState:
     if state.test is None:
-        raise ParameterError("This state lacks what the controller keeps of it: begin with init().")
+        raise ParameterError("This state lacks the part that the controller stores: begin with init().")
     return state.test
 
 
 _LARGEST_N, _TO_N = 1000.0, 0.1
-"""Up to which force it is asked, and how exactly [N]."""
+"""Largest force of the bisection, and its resolution [N]."""
 _USUAL = LocalisationParams()
-"""Times over which torques are averaged where no contact is localised."""
+"""Times of the averages without localisation."""

@@ -1,9 +1,9 @@
-"""Yielding to a push as long as it lasts: a virtual mass and damper in joint space that take energy and give none.
+"""Yielding to a push as long as it lasts: a virtual mass and damper in joint space that only take energy.
 
 Each joint obeys M dv/dt = d(tau) - D v, integrated implicitly, with tau the external torque less its mean in free
 motion. See docs/explanation/reaction.md for why joint space, and for the bound on the energy (Hannaford and Ryu 2002;
-Ferraguti et al. 2015; both bound it with what they call passivity observer and energy tank). No point of the body's
-axes is faster than a bound, nor comes farther from where it was than another.
+Ferraguti et al. 2015, whose passivity observer and energy tank it uses). The speed of all points of the body's axes is
+bounded, and so is their distance from the start.
 """
 
 import math
@@ -19,42 +19,42 @@ from pretouch.robot.kinematics import Chain, Kinematics, dot, point_velocity
 from pretouch.types import BoolArray, FloatArray
 
 Axes = tuple[Kinematics, BoolArray, Capsules]
-"""Posture of an arm, which joints move a link (L, n), and the capsules of its body."""
+"""Posture of an arm, the joints that move each link (L, n), and the capsules of its body."""
 
 
 MARKS = 12
-"""Places that are remembered of the path the arm came."""
+"""Number of marks of the path before the contact."""
 
 
 class VirtualMass(NamedTuple):
-    """The virtual mass of n joints, what is remembered of the torque that moves it, and the way of the task."""
+    """The virtual mass of n joints, with the memory of its torque and of the path before the contact."""
 
     mean: Annotated[FloatArray, 2, "n"]
     """(2, n) residual torque filtered once and twice [Nm]; the latter is the mean in free motion."""
     samples: IntCell
-    """How many samples the mean holds."""
+    """Number of samples in the mean."""
     torque: Annotated[FloatArray, "n"]
     """(n,) last residual less the mean [Nm]."""
     velocity: Annotated[FloatArray, "n"]
-    """(n,) of the virtual mass [rad/s]."""
+    """(n,) velocity of the virtual mass [rad/s]."""
     side: Annotated[FloatArray, "n"]
     """(n,) sign of the torque that last drove each joint in this reaction, 0 for none."""
     tank: Cell
-    """Energy taken from the push and not given back, with the start value [J]."""
+    """Energy taken from the push and not returned, plus the start value [J]."""
     steady: Annotated[FloatArray, 2, "n"]
     """(2, n) torque filtered once and twice, without most of its noise [Nm]."""
     sliding: Annotated[FloatArray, "n"]
-    """(n,) 1 of a joint that a push has torn loose from static friction, 0 of one that sticks."""
+    """(n,) 1 for a joint that slides against static friction, 0 for one that sticks."""
     quiet: Cell
-    """Time since a torque moved a joint or kept it moving [s]."""
+    """Time since a torque last moved a joint [s]."""
     no_contact: Cell
-    """Time since the detector found a contact [s]."""
+    """Time since the last detected contact [s]."""
     since: Cell
-    """Time since the contact that began a reaction [s], infinite without one."""
+    """Time since the contact at the start of the reaction [s], infinite without one."""
     path: Annotated[FloatArray, "M", "n"]
     """(M, n) joint positions commanded on the path before the contact, newest first [rad]."""
     marked: Cell
-    """Time since the newest was noted [s]."""
+    """Time since the newest mark [s]."""
 
 
 def mass_init(n: int, params: AdmittanceParams) -> VirtualMass:
@@ -65,23 +65,22 @@ def mass_init(n: int, params: AdmittanceParams) -> VirtualMass:
 
 
 def settle(mass: VirtualMass, params: AdmittanceParams) -> None:
-    """Forget a reaction: nothing has pushed the mass, and it stands."""
+    """Reset the reaction: the mass is at rest."""
     for part in (mass.velocity, mass.side, mass.steady, mass.sliding, mass.quiet, mass.no_contact):
         part[:] = 0.0
     mass.tank[0], mass.since[0] = params.start_energy_j, math.inf
 
 
 def dead_band(torque_limit: FloatArray, params: AdmittanceParams) -> FloatArray:
-    """External torque (n,) that moves nothing [Nm], given the joints' torque limits (n,) [Nm]."""
+    """Return the external torque (n,) that moves nothing [Nm], for the joints' torque limits (n,) [Nm]."""
     return params.dead_band_nm + params.dead_band_fraction * torque_limit
 
 
 @compiled
 def learn_mean(mass: VirtualMass, residual: FloatArray, dt: float) -> None:
-    """Let a sample (n,) of free motion into the mean.
+    """Add a sample (n,) of free motion to the mean.
 
-    Of two filters in a row the second takes in little of what has only begun: of a torque that has lasted for 60 ms
-    less than one part in a hundred.
+    The second of two filters in a row contains little of a new torque: after 60 ms less than one part in a hundred.
     """
     # the mean of all samples at first, an exponential one from T / dt samples on
     mean, samples = mass.mean, mass.samples
@@ -96,10 +95,10 @@ def learn_mean(mass: VirtualMass, residual: FloatArray, dt: float) -> None:
 def begin(
     mass: VirtualMass, axes: Axes, torque: FloatArray, before: FloatArray, band: FloatArray, params: AdmittanceParams
 ) -> None:
-    """Begin a reaction: at the speed that the torque (n,) [Nm] would keep up, as far as the start energy allows.
+    """Begin a reaction at the speed that the torque (n,) [Nm] would maintain, as far as the start energy allows.
 
-    With static friction a joint begins only where the torque measured `before` (n,) [Nm] says the same, and at the
-    lesser of both: what only noise or a small bias says moves no joint, and so none towards who pushes.
+    With static friction a joint begins only where the torque measured `before` (n,) [Nm] has the same sign, and with
+    the smaller of both: so noise or a small bias moves no joint, and none towards the person.
     """
     lesser, least = torque, band
     if params.static_friction_nm > 0:
@@ -117,26 +116,26 @@ def begin(
 
 
 _MEAN_S = 0.5
-"""Time constant of each of the two filters whose output is the mean torque in free motion [s]: longer than it takes to
-find a contact, so that little of one is in it, and shorter than a bias takes to drift."""
+"""Time constant of each of the two filters whose output is the mean torque in free motion [s]: longer than a contact's
+detection, so that it contains little of one, and shorter than the drift of a bias."""
 _REVERSE_BAND = 2.0
-"""Factor on the dead band of a joint for torques against the push it has just yielded to: what the release of a push
-leaves in the estimate must not pull the arm towards the person."""
+"""Factor on the dead band of a joint for torques against the last push: the rest of a released push in the estimate
+must not pull the arm towards the person."""
 _TANK_MAX_J = 2.0
-"""Most of the energy taken from a push that is kept to be given back [J]: that of 15 N over 0.13 m."""
+"""Largest energy of a push in the tank [J]: that of 15 N over 0.13 m."""
 _STEADY_S = 0.1
 """Time constant of each of the two filters that take the noise out of the torque [s]."""
 _KEEPS = 0.85
-"""Share of the static friction beyond which a torque keeps a joint moving that it tore loose: a bias of two thirds of
-it lets a joint stop, and does not tear it loose again."""
+"""Share of the static friction above which a torque keeps a joint sliding: with a bias of two thirds of it, a joint
+stops and does not slide again."""
 _AT_ONCE = 2.0
-"""Times the static friction from which two samples in a row tear a joint loose, whatever the filters say."""
+"""Factor on the static friction: two successive samples above it make a joint slide, independent of the filters."""
 _FIRST_S = 0.3
-"""Time after the onset of a contact in which two samples beyond what keeps a joint moving do the same [s]."""
+"""Time after the onset of a contact in which two samples above `_KEEPS` do the same [s]."""
 _REST_RAD_S = 1e-3
-"""Speed at which a joint that nothing drives sticks [rad/s]: none that can be seen."""
+"""Speed at which an undriven joint sticks [rad/s]: invisible."""
 _LEAST_M_S = 1e-12
-"""An arm that is no faster stands [m/s]."""
+"""Speed up to which an arm is at rest [m/s]."""
 
 
 @compiled
@@ -149,12 +148,12 @@ def yield_to(
     Args:
         mass: changed.
         residual: (n,) external torque [Nm].
-        command: (n,) joint velocities commanded last [rad/s].
+        command: (n,) last joint velocity command [rad/s].
         band: (n,) dead band [Nm].
         axes: of the body, in this posture.
         p: parameters.
         dt: period [s].
-        contact: whether the detector finds one.
+        contact: whether a contact is detected.
     """
     pushed, velocity = _drive(mass, residual, command, band, p, dt), mass.velocity
     velocity *= min(1.0, p.speed_max_m_s / max(fastest_point(axes, velocity), _LEAST_M_S))
@@ -167,7 +166,7 @@ def yield_to(
 def _drive(
     mass: VirtualMass, residual: FloatArray, command: FloatArray, band: FloatArray, p: AdmittanceParams, dt: float
 ) -> bool:
-    """Let the torque move the mass, as far as the energy in the tank allows; return whether a push goes on."""
+    """Move the mass by the torque, as far as the energy in the tank allows; return whether a push continues."""
     before, torque, velocity, side = mass.torque.copy(), mass.torque, mass.velocity, mass.side
     steady, sliding, friction, damping, n = mass.steady, mass.sliding, p.static_friction_nm, p.damping_nm_s, len(band)
     # the estimate is a low pass of the force u, y = keep y_before + (1 - keep) u; solved for u below
@@ -179,22 +178,22 @@ def _drive(
         torque[i] = residual[i] - mass.mean[1, i]
         steady[0, i] += weight * (torque[i] - steady[0, i])
         steady[1, i] += weight * (steady[0, i] - steady[1, i])
-        # stick and slip: what tears a joint loose has to show in two values, less keeps it moving
+        # stick and slip: two values must exceed the friction for a joint to slide; less keeps it sliding
         lasts = abs(steady[0, i]) > max(band[i], _KEEPS * friction)
         starts = _both(steady[0, i], steady[1, i], friction) or _both(torque[i], before[i], at_once * friction)
         sliding[i] = 1.0 if friction == 0.0 or starts or (sliding[i] > 0.0 and lasts) else 0.0
         pushed = pushed or (lasts and sliding[i] > 0.0)
 
-        # what acted in the last period, by the exact inverse of the estimate's lag over one period
+        # the torque of the last period, by the exact inverse of the estimate's lag over one period
         acted[i] = (torque[i] - keep * before[i]) / (1.0 - keep)
-        # the least energy that it gave, whichever of the two is true and whatever is wrong within the dead band
+        # the least energy of the push, for either torque and any error within the dead band
         power += min(torque[i] * velocity[i], acted[i] * velocity[i]) - band[i] * abs(velocity[i])
         measured, now = _beyond(torque[i], band[i]), _beyond(acted[i], band[i])
-        # the lesser of both, and nothing where they disagree: a force that has ended no longer drives the arm
+        # the smaller of both, and 0 for different signs: a force that has ended no longer drives the arm
         drive = 0.0
         if measured * now > 0.0 and sliding[i] > 0.0:
             drive = measured if abs(measured) < abs(now) else now
-        # against the push the joint has yielded to: what a release leaves in the estimate, unless well beyond the band
+        # against the last push: the rest of a release in the estimate, unless well above the band
         if drive * side[i] < 0.0:
             far = min(abs(torque[i]), abs(acted[i])) > _REVERSE_BAND * band[i]
             drive = drive if far else 0.0
@@ -202,16 +201,16 @@ def _drive(
         velocity[i] = (p.inertia_kg_m2 * velocity[i] + dt * drive) / (p.inertia_kg_m2 + dt * damping)
         if drive != 0.0:
             side[i] = np.sign(drive)
-        # undriven, a joint stops that the arm does not move that way, or that has all but stopped
+        # an undriven joint stops if the arm does not move it that way, or if it is nearly at rest
         elif velocity[i] * command[i] <= 0.0 or (friction > 0.0 and abs(velocity[i]) < _REST_RAD_S):
             velocity[i] = 0.0
         elif abs(velocity[i]) > abs(command[i]):
-            # nothing drives it: it is never asked for more than it does
+            # undriven: never faster than the command
             velocity[i] = command[i]
-    # passivity observer; the cap keeps a long push from paying for a long motion after it
+    # passivity observer; the cap prevents that a long push allows a long motion after it
     mass.tank[0] = min(mass.tank[0] + dt * power, _TANK_MAX_J)
     if mass.tank[0] < 0.0:
-        # no more to give: only what takes energy may move
+        # empty: only joints that take energy may move
         for i in range(n):
             if min(torque[i] * velocity[i], acted[i] * velocity[i]) <= band[i] * abs(velocity[i]):
                 velocity[i] = 0.0
@@ -220,19 +219,19 @@ def _drive(
 
 @kernel
 def _both(one: float, other: float, level: float) -> bool:
-    """Whether both are beyond a level, on the same side."""
+    """Return whether both exceed a level with the same sign."""
     return one * other > 0.0 and min(abs(one), abs(other)) > level
 
 
 @kernel
 def _beyond(torque: float, band: float) -> float:
-    """How far a torque lies beyond the dead band, with its sign: never more than it is without a bias that small."""
+    """Return the part of a torque beyond the dead band, with its sign."""
     return np.sign(torque) * max(0.0, abs(torque) - band)
 
 
 @compiled
 def fastest_point(axes: Axes, qd: FloatArray) -> float:
-    """Speed [m/s] of the fastest end of any capsule's axis at joint velocities `qd` (n,) [rad/s].
+    """Return the speed [m/s] of the fastest end of any capsule's axis at joint velocities `qd` (n,) [rad/s].
 
     The speed along an axis is convex, so no point of it is faster than both its ends.
     """
@@ -247,25 +246,26 @@ def fastest_point(axes: Axes, qd: FloatArray) -> float:
 
 
 BRAKES_S = 0.2
-"""Time constant with which the speed away falls near the reach [s]: at 0.3 m/s from 0.06 m before it, by 1.5 m/s^2."""
+"""Time constant of the speed near the reach [s]: from 0.3 m/s at 0.06 m before it, with 1.5 m/s^2."""
 _LEAST_M = 1e-6
-"""A point that has come no farther has no direction in which it went [m]."""
+"""Distance up to which a displacement has no direction [m]."""
 
 
 @compiled
 def within_reach(axes: Axes, qd: FloatArray, origin: FloatArray, reach: float) -> tuple[FloatArray, float]:
-    """Slow joint velocities (n,) [rad/s] that lead the arm too far from where it was.
+    """Slow joint velocities (n,) [rad/s] that lead the arm too far from its start.
 
-    How far a point has come is convex along an axis, so no point of it has come farther than both its ends. All joints
-    slow alike: none turns round, and so none turns towards who pushes. What leads no end farther away is left as it is.
+    The displacement is convex along an axis, so no point of it is farther away than both its ends. All joints slow by
+    the same factor: none reverses, and so none turns towards the person. A motion that leads no end farther away is not
+    changed.
 
     Args:
         axes: of the body, in this posture.
         qd: joint velocities.
-        origin: (2, C, 3) where the ends of the axes were [m].
-        reach: how far they may come [m].
+        origin: (2, C, 3) ends of the axes at the start [m].
+        reach: largest displacement [m].
 
-    Returns the velocities, and how far the farthest end has come [m].
+    Returns the velocities, and the displacement of the farthest end [m].
     """
     kin, moved_by, capsules = axes
     (link, a, b, _), share, farthest = placed(capsules, kin), 1.0, 0.0

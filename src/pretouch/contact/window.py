@@ -18,21 +18,21 @@ class Window(NamedTuple):
     ring: Annotated[FloatArray, "N", 3]
     """(N, 3), oldest at `next` once full."""
     next: IntCell
-    """Where the next value goes."""
+    """Index of the next value."""
     samples: IntCell
-    """Values held so far, at most N."""
+    """Number of values, at most N."""
     sums: Annotated[FloatArray, 4, 3]
-    """(4, 3) the value added last, the origin o the sums are taken about, so that a large mean costs no digits, the sum
-    of (value - o), and that of its square."""
+    """(4, 3) last value; origin o of the sums, so that a large mean costs no digits; sum of (value - o); sum of its
+    square."""
 
     @property
     def full(self) -> bool:
-        """Whether the window holds N values, so that its statistics mean something."""
+        """True if the window has N values, so that its statistics are meaningful."""
         return bool(self.samples[0] == len(self.ring))
 
     @property
     def newest(self) -> FloatArray:
-        """The value added last (3,), zero of an empty window."""
+        """Last value (3,), zero for an empty window."""
         return self.sums[_NEWEST]
 
     def mean(self) -> FloatArray:
@@ -51,7 +51,7 @@ def window_init(samples: int) -> Window:
 
 @compiled
 def window_mean(sums: FloatArray, count: int) -> FloatArray:
-    """Mean (3,) of a window with these sums (4, 3) and so many values; see `Window`."""
+    """Return the mean (3,) of a window with these sums (4, 3) and a number of values; see `Window`."""
     mean = np.empty(3)
     for i in range(3):
         mean[i] = sums[_ORIGIN, i] + sums[_TOTAL, i] / max(count, 1)
@@ -60,7 +60,7 @@ def window_mean(sums: FloatArray, count: int) -> FloatArray:
 
 @compiled
 def window_std(sums: FloatArray, count: int) -> FloatArray:
-    """Sample standard deviation (3,) of a window with these sums (4, 3) and so many values; see `Window`."""
+    """Return the sample standard deviation (3,) of a window with these sums (4, 3) and a number of values."""
     std = np.zeros(3)
     if count > 1:
         for i in range(3):
@@ -73,7 +73,7 @@ def window_std(sums: FloatArray, count: int) -> FloatArray:
 def weighted_value(
     reading: FloatArray, last: FloatArray, mean: FloatArray, std: FloatArray, p: WindowParams
 ) -> FloatArray:
-    """Value x_t that enters the window, eq. 8 of the paper: an outlier counts with weight alpha. Per axis [N].
+    """Return the value x_t that enters the window, eq. 8 of the paper: an outlier has the weight alpha. Per axis [N].
 
     With x the reading: alpha x + (1 - alpha) x_{t-1} if |x - mu_{t-1}| > lambda sigma_{t-1}, else x. With sigma = 0
     every change is an outlier.
@@ -81,12 +81,14 @@ def weighted_value(
     value = reading.copy()
     for i in range(len(value)):
         if abs(reading[i] - mean[i]) > p.lambda_ * std[i]:
-            value[i] = p.alpha * reading[i] + (1 - p.alpha) * last[i]  # x_{t-1} as it entered, not as it was read
+            value[i] = (
+                p.alpha * reading[i] + (1 - p.alpha) * last[i]
+            )  # x_{t-1} as it entered the window, not the reading
     return value
 
 
 def add_force(window: Window, reading: FloatArray | None, p: WindowParams) -> Window:
-    """Add a force reading (3,) [N]: as it is until the window is full, through eq. 8 from then on; None: nothing."""
+    """Add a force reading (3,) [N]: unchanged until the window is full, then through eq. 8; None adds nothing."""
     if reading is None:
         return window
     after = Window._make(part.copy() for part in window)
@@ -96,10 +98,10 @@ def add_force(window: Window, reading: FloatArray | None, p: WindowParams) -> Wi
 
 @compiled
 def add_sample(window: Window, reading: FloatArray, p: WindowParams) -> None:
-    """Do what `add_force` says to the window itself."""
+    """Add a reading as `add_force` does, to the window itself."""
     ring, sums, at, count = window.ring, window.sums, window.next[0], window.samples[0]
-    # Once a turn the sums are taken afresh, so that rounding errors never add up: O(1) on average. That is before the
-    # next value and not after the last one, for what a step says of its window is of the running sums.
+    # Once a turn the sums are computed anew, so that rounding errors do not accumulate: O(1) on average. That is before
+    # the next value, not after the last one, because a step reports the running sums.
     if count == 1 or (count > 0 and at == 0):
         for i in range(3):
             sums[_ORIGIN, i], sums[_TOTAL, i], sums[_SQUARES, i] = sums[_NEWEST, i], 0.0, 0.0
@@ -108,12 +110,12 @@ def add_sample(window: Window, reading: FloatArray, p: WindowParams) -> None:
                 sums[_TOTAL, i] += off
                 sums[_SQUARES, i] += off**2
     x, full = reading, count == len(ring)
-    # not before: the sigma of few values is near 0, and eq. 8 would take most readings for outliers
+    # not before: the sigma of few values is near 0, and for eq. 8 most readings would be outliers
     if full:
         x = weighted_value(reading, sums[_NEWEST], window_mean(sums, count), window_std(sums, count), p)
     for i in range(3):
-        gone, ring[at, i], sums[_NEWEST, i] = ring[at, i], x[i], x[i]
-        new, old = x[i] - sums[_ORIGIN, i], gone - sums[_ORIGIN, i] if full else 0.0
+        oldest, ring[at, i], sums[_NEWEST, i] = ring[at, i], x[i], x[i]
+        new, old = x[i] - sums[_ORIGIN, i], oldest - sums[_ORIGIN, i] if full else 0.0
         sums[_TOTAL, i] += new - old
         sums[_SQUARES, i] += new**2 - old**2
     window.next[0], window.samples[0] = (at + 1) % len(ring), min(count + 1, len(ring))

@@ -2,9 +2,9 @@
 
     minimise  1/2 x^T H x + f^T x   subject to  lower <= x <= upper,  G x <= h
 
-Goldfarb and Idnani (1983): from the least of the cost on its own, the bound that is violated most is taken in, and
-those let go whose multipliers fall to zero on the way. Each step raises the cost, so no set in force comes twice. Where
-a bound cannot be taken in, it and those in force contradict each other, and the answer says with which weights.
+Goldfarb and Idnani (1983): from the unconstrained minimum on, the most violated bound is added to those in force, and
+those are dropped whose multipliers fall to zero on the way. Each step raises the cost, so no set in force comes twice.
+Where a bound cannot be added, it and those in force contradict each other, and the answer gives the weights.
 
 Bounds are a^T x <= b with |a| = 1: n upper and n lower ones of the box, then rows that some x of the box violates. With
 H = L L^T and y = L^T x the cost is 1/2 |y - y_0|^2, and a bound has the normal L^-1 a.
@@ -16,7 +16,7 @@ import numpy as np
 
 from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import kernel
-from pretouch.control.penalty import Minimum, Problem, excess_of, excesses, finite, possible_rows
+from pretouch.control.penalty import Minimum, QuadraticProgram, excess_of, excesses, finite, possible_rows
 from pretouch.modes import BUDGET, INFEASIBLE, NOT_CONVEX, NOT_FINITE, SOLVED
 from pretouch.types import FloatArray, IntArray
 
@@ -24,23 +24,23 @@ _MET = 1e-12
 """Excess on a bound up to which it holds [rad/s]: rounding."""
 
 _CONTRADICTION = 1e-10
-"""Excess up to which a bound holds whose normal those in force span [rad/s]."""
+"""Excess up to which a bound holds whose normal is a combination of those in force [rad/s]."""
 
 _DEPENDENT = 1e-8
-"""Sine of the angle, in y, between a normal and those in force below which they span it."""
+"""Sine of the angle, in y, between a normal and those in force below which it is a combination of them."""
 
 _FALLS = 1e-12
-"""Rate above which a multiplier falls, for one of the bound that is taken in."""
+"""Rate above which a multiplier falls while that of the added bound rises by one."""
 
 _SHORT = 1e-12
-"""Length of a row up to which no joint moves what it is about [m]."""
+"""Length of a row up to which no joint moves its point [m]."""
 
 
 class _Force(NamedTuple):
-    """The m bounds in force, up to n, and behind them the one that is taken in."""
+    """The m bounds in force, up to n, and behind them the one that is being added."""
 
     bound: IntArray
-    """(n + 1,) which, by their place among all."""
+    """(n + 1,) indices among all bounds."""
     multiplier: FloatArray
     """(n + 1,)"""
     normal: FloatArray
@@ -50,15 +50,15 @@ class _Force(NamedTuple):
     R: FloatArray
     """(n, n) upper triangle."""
     from_excess: FloatArray
-    """(2 n + R,) from which excess on a bound counts as violated [rad/s]: none while it is in force."""
+    """(2 n + R,) excess from which a bound counts as violated [rad/s]: infinite while it is in force."""
 
 
 @kernel
-def minimise_within(problem: Problem, budget: int, answer: Minimum) -> int:
-    """Write the minimum, and say how that ended; `budget` counts bounds that are taken in or let go.
+def minimise_within(problem: QuadraticProgram, budget: int, answer: Minimum) -> int:
+    """Write the minimum and return the ending; `budget` counts the bounds that are added or dropped.
 
-    The weight of the problem does not count. Where there is no answer, multipliers are weights of bounds and rows that
-    contradict each other: added up with them, they read 0 <= something negative.
+    The weight of the problem does not count. Without a solution, the multipliers are weights of bounds and rows that
+    contradict each other: their weighted sum is 0 <= a negative number.
     """
     n, L = len(problem.f), np.empty_like(problem.H)
     answer.multipliers[:] = 0.0
@@ -81,10 +81,8 @@ def minimise_within(problem: Problem, budget: int, answer: Minimum) -> int:
         elif problem.h[k] < -_MET:
             answer.multipliers[n + k] = 1.0
             return INFEASIBLE
-    force = _Force(
-        np.empty(n + 1, np.int64), np.zeros(n + 1), np.empty((n + 1, n)), np.empty((n, n)), np.zeros((n, n)),
-        np.full(count, _MET),
-    )  # fmt: skip
+    bound, normal, Q = np.empty(n + 1, np.int64), np.empty((n + 1, n)), np.empty((n, n))
+    force = _Force(bound, np.zeros(n + 1), normal, Q, np.zeros((n, n)), np.full(count, _MET))
     ending, m = _search(L, problem.f, A, b[:count], force, budget, answer.x)
     for j in range(m):
         c = force.bound[j]
@@ -98,8 +96,8 @@ def minimise_within(problem: Problem, budget: int, answer: Minimum) -> int:
 @kernel
 def _search(
     L: FloatArray, f: FloatArray, A: FloatArray, b: FloatArray, force: _Force, budget: int, x: FloatArray
-) -> tuple[int, int]:  # fmt: skip
-    """Write the minimum to x (n,); say how that ended, and how many bounds are in force or contradict each other."""
+) -> tuple[int, int]:
+    """Write the minimum to x (n,); return the ending, and the number of bounds in force or in contradiction."""
     n, m, weight = len(f), 0, force.multiplier
     room = np.empty((4, n))
     least, y, rest, r = room[0], room[1], room[2], room[3]
@@ -116,7 +114,7 @@ def _search(
             if budget <= 0:
                 return BUDGET, 0
             budget -= 1
-            # where the multiplier of the bound rises by t, y moves by -t rest, and those in force rise by -t r
+            # while the multiplier of the bound rises by t, y moves by -t rest, and the others rise by -t r
             height = _split(force, m, r, rest)
             if height == 0.0 and excess <= _CONTRADICTION:
                 force.from_excess[bound] = _CONTRADICTION
@@ -139,13 +137,13 @@ def _search(
             for j in range(m):
                 weight[j] = max(0.0, weight[j] - t * r[j])
             weight[m] += t
-            _let_go(force, m, first, r, rest)
+            _drop(force, m, first, r, rest)
             m -= 1
 
 
 @kernel
 def _most_violated(A: FloatArray, b: FloatArray, x: FloatArray, from_excess: FloatArray) -> tuple[int, float]:
-    """Return which bound is violated most, -1 for none, and by how much [rad/s]."""
+    """Return the most violated bound, -1 for none, and its excess [rad/s]."""
     worst, most = -1, 0.0
     for c in range(len(b)):
         excess = excess_of(A, b, c, x)
@@ -156,9 +154,9 @@ def _most_violated(A: FloatArray, b: FloatArray, x: FloatArray, from_excess: Flo
 
 @kernel
 def _split(force: _Force, m: int, r: FloatArray, rest: FloatArray) -> float:
-    """Write the normal of bound m as sum of r_j times those before it and `rest`, and column m of Q and R.
+    """Write the normal of bound m as a sum of r_j times those before it and `rest`, and column m of Q and R.
 
-    Returns the length of `rest` (n,), 0 where those before it span it.
+    Returns the length of `rest` (n,), 0 where the normal is a combination of those before it.
     """
     normal, Q, R, n = force.normal, force.Q, force.R, len(rest)
     for i in range(n):
@@ -189,7 +187,7 @@ def _split(force: _Force, m: int, r: FloatArray, rest: FloatArray) -> float:
 
 @kernel
 def _settle(b: FloatArray, force: _Force, m: int, least: FloatArray, y: FloatArray) -> None:
-    """Write y and the multipliers where the m bounds in force are met, afresh: so rounding does not add up."""
+    """Compute y and the multipliers anew for the m bounds in force, so that rounding does not accumulate."""
     n, Q, R, weight, reach = len(y), force.Q, force.R, force.multiplier, np.empty(m)
     y[:] = least
     for j in range(m):
@@ -211,8 +209,8 @@ def _settle(b: FloatArray, force: _Force, m: int, least: FloatArray, y: FloatArr
 
 
 @kernel
-def _let_go(force: _Force, m: int, first: int, r: FloatArray, rest: FloatArray) -> None:
-    """Take bound `first` out of those m in force."""
+def _drop(force: _Force, m: int, first: int, r: FloatArray, rest: FloatArray) -> None:
+    """Drop bound `first` of the m bounds in force."""
     _bar(force, force.bound[first], len(rest), _MET)
     for j in range(first, m):
         force.bound[j], force.multiplier[j] = force.bound[j + 1], force.multiplier[j + 1]
@@ -224,7 +222,7 @@ def _let_go(force: _Force, m: int, first: int, r: FloatArray, rest: FloatArray) 
 
 @kernel
 def _bar(force: _Force, bound: int, n: int, excess: float) -> None:
-    """Count a bound, and the one opposite to one of the box, as violated from an excess on."""
+    """Set the excess from which a bound counts as violated; for one of the box, that of the opposite bound too."""
     force.from_excess[bound] = excess
     if bound < 2 * n:
         force.from_excess[(bound + n) % (2 * n)] = excess

@@ -1,4 +1,4 @@
-"""Restricting the body's approach to obstacles: as rows G qd <= h of the QP; those of eqs. 5-7, and what others are."""
+"""Restriction of the body's approach to obstacles, as rows G qd <= h of the QP: eqs. 5-7, and the interface."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
@@ -19,58 +19,58 @@ from pretouch.values import value
 
 @value
 class MotionBody:
-    """What does not change from step to step."""
+    """Constants of a restriction's steps."""
 
     model: RobotModel
     units: int
-    """How many units the skin has."""
+    """Number of units of the skin."""
     limits: JointLimits
     task: TaskParams
 
 
 class MotionRequest(NamedTuple):
-    """What is asked of the arm in one step."""
+    """Motion that the QP of one step aims at."""
 
     velocity: Annotated[FloatArray, 3]
-    """(3,) of the end-effector origin [m/s]."""
+    """(3,) velocity of the end-effector origin [m/s]."""
     goal: Annotated[FloatArray, 3, 3]
-    """(3, 3) R_O_ee to hold, if the task asks for it."""
+    """(3, 3) R_O_ee to hold, if the task holds an orientation."""
     qd: Annotated[FloatArray, "n"]
     """(n,) joint velocities [rad/s]."""
     by_joints: IntCell
-    """Whether they are asked for in place of the velocity, within the same limits."""
+    """1 if the joint velocities replace the velocity, within the same limits."""
     hold: IntCell
-    """Whether to brake, whatever else is asked."""
+    """1 if the arm brakes in place of any motion."""
     advances: IntCell
-    """Whether the phase goes on with the motion."""
+    """1 if the phase advances with the motion."""
     touch_m_s: Cell
-    """Speed at which an arm that a contact moves may touch what it sees, and then nothing drives it away from what
-    comes nearer [m/s]; NaN for what the profile says."""
+    """Speed at which an arm that a contact moves may touch obstacles [m/s]; approaching ones then do not drive it
+    away. NaN: the speed of the profile."""
     untouched: IntCell
-    """`Obstacles.unit` from which on an obstacle is not to be touched at any speed."""
+    """`Obstacles.unit` from which obstacles must not be touched at any speed."""
 
 
 @value
 class Restricted:
-    """What a restriction allows: R rows G @ qd <= h of the QP, and more if it needs to."""
+    """Result of a restriction: R rows G @ qd <= h of the QP, and optional other limits."""
 
     G: FloatArray
     """(R, n) approach velocity of a body point per joint velocity [m]."""
     h: FloatArray
     """(R,) largest approach velocity [m/s]; negative asks for a retreat."""
     which: IntArray
-    """(K',) index of the obstacle that each of the first K' rows belongs to; those after them are of none."""
+    """(K',) obstacle of each of the first K' rows; the rows after them belong to no obstacle."""
     weight: float
     """Weight of a row's squared violation against the squared task error of eq. 2, both in (m/s)^2; 0: the rows are
-    hard, and the arm brakes where the joint box leaves no way to keep them."""
+    hard, and the arm brakes where the joint box is incompatible with them."""
     velocity: FloatArray | None = None
-    """(3,) added to the velocity asked of the end-effector origin [m/s]."""
+    """(3,) added to the desired velocity of the end-effector origin [m/s]."""
     speeds: tuple[FloatArray, FloatArray] | None = None
-    """(n,) least and (n,) largest joint velocities [rad/s]; what the acceleration does not allow comes later."""
+    """(n,) least and (n,) largest joint velocities [rad/s]; acceleration limits come first."""
 
 
-class Rows(NamedTuple):
-    """Rows of the QP as compiled code takes them, see `Restricted`."""
+class ConstraintRows(NamedTuple):
+    """Rows of the QP for compiled code, see `Restricted`."""
 
     G: FloatArray
     h: FloatArray
@@ -78,41 +78,40 @@ class Rows(NamedTuple):
     weight: float
 
 
-def rows_of(allowed: Restricted, n: int) -> tuple[Rows, tuple[FloatArray, FloatArray]]:
-    """Return rows and joint speeds for compiled code, (0,) each where they are free; a ParameterError for wrong shapes.
+def rows_of(allowed: Restricted, n: int) -> tuple[ConstraintRows, tuple[FloatArray, FloatArray]]:
+    """Return rows and joint speeds for compiled code, (0,) each for free speeds; wrong shapes are a ParameterError.
 
-    Other types or orders in memory would be compiled for anew, while the arm waits.
+    Other types or memory orders would be compiled anew, while the arm waits.
     """
-    count, seen, free = len(allowed.h), len(allowed.which), np.zeros(0)
-    if allowed.G.shape != (count, n) or seen > count:
+    count, obstacles, free = len(allowed.h), len(allowed.which), np.zeros(0)
+    if allowed.G.shape != (count, n) or obstacles > count:
         shapes = f"G {allowed.G.shape}, h {allowed.h.shape}, which {allowed.which.shape}"
         raise ParameterError(f"A restriction's rows are {shapes}: G is (R, {n}), h is (R,), which is at most (R,).")
     G, h, slowest, fastest = (
         np.ascontiguousarray(part, float) for part in (allowed.G, allowed.h, *(allowed.speeds or (free, free)))
     )
-    return Rows(G, h, np.ascontiguousarray(allowed.which, WHOLE), float(allowed.weight)), (slowest, fastest)
+    return ConstraintRows(G, h, np.ascontiguousarray(allowed.which, WHOLE), float(allowed.weight)), (slowest, fastest)
 
 
 class Restriction(Part, group="pretouch.restrictions"):
-    """What keeps the body from what is near. A part of it is a frozen dataclass of its parameters."""
+    """Restricts the motion of the body near obstacles. A part is a frozen dataclass of its parameters."""
 
     def init(self, body: MotionBody) -> Any:
-        """Return what is remembered before the first step; None for nothing."""
+        """Return the state before the first step; None without one."""
         return None
 
     def step(
-        self, state: Any, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
-        request: MotionRequest,
-    ) -> tuple[Restricted, Any]:  # fmt: skip
-        """Return what is allowed in one step, and what to remember.
+        self, state: Any, body: MotionBody, kin: Kinematics, robot: RobotState, near: Obstacles, request: MotionRequest
+    ) -> tuple[Restricted, Any]:
+        """Return the limits of one step, and the state after it.
 
         Args:
-            state: what is remembered.
-            body: what is fixed.
+            state: after the step before.
+            body: constants.
             kin: posture.
             robot: state of the arm.
-            obstacles: what is near.
-            request: what is asked of the arm.
+            near: obstacles.
+            request: motion of the step.
         """
         raise NotImplementedError
 
@@ -143,7 +142,7 @@ def approach_limit(d: float, p: RestrictionParams) -> float:
     limit never lies below the floor.
     """
     if not d < p.d_notice_m:
-        return np.inf  # dropped, not eased: just below, V_b allows V_max
+        return np.inf  # no gradual end: just below, V_b allows V_max
     if d < p.d_repulse_m:
         # never positive: the point has to retreat, at V_max in penetration; with a floor it may come on all the same
         return max(velocity_a(d, p.v_max_m_s, p.beta, p.d_crit_m) - p.v_max_m_s, p.floor_m_s)
@@ -152,13 +151,13 @@ def approach_limit(d: float, p: RestrictionParams) -> float:
 
 
 def row_numbers(params: RestrictionParams) -> Any:
-    """Return the numbers of eqs. 5-7: a floor of -inf is none, and rows of the weight 0 are hard."""
+    """Return the numbers of eqs. 5-7: a floor of -inf stands for no floor, and the weight 0 for hard rows."""
     floor = params.floor_m_s if params.rows == "floor" else -np.inf
     return params.numbers._replace(floor_m_s=floor, slack_weight=0.0 if params.rows == "hard" else params.slack_weight)
 
 
 @kernel
-def approach_rows(kin: Kinematics, moved_by: BoolArray, near: Obstacles, p: RestrictionParams) -> Rows:
+def approach_rows(kin: Kinematics, moved_by: BoolArray, near: Obstacles, p: RestrictionParams) -> ConstraintRows:
     """Rows d^T J_c qd <= x_a for all obstacles within d_notice.
 
     J_c is the Jacobian of the closest body point, d the direction from it to the obstacle; `moved_by` (L, n) says
@@ -174,19 +173,19 @@ def approach_rows(kin: Kinematics, moved_by: BoolArray, near: Obstacles, p: Rest
         h[count], which[count] = limit, k
         row_along(chain, near.link[k], near.body_point[k], near.direction[k], G[count])
         count += 1
-    return Rows(G[:count], h[:count], which[:count], p.slack_weight)
+    return ConstraintRows(G[:count], h[:count], which[:count], p.slack_weight)
 
 
 @dataclass(frozen=True)
 class ApproachRestriction(RestrictionParams, Restriction, name="paper"):
-    """Restricting the body's approach to obstacles, as in the paper (eqs. 5-7); compiled in `line`."""
+    """Restriction of the body's approach to obstacles, as in the paper (eqs. 5-7); compiled in `line`."""
 
 
 def notice_m(part: Restriction | None) -> float:
-    """Return from which body distance on a restriction allows everything [m]: its own, or Table I's."""
+    """Return the body distance from which a restriction allows any motion [m]: its own, or Table I's."""
     return float(getattr(part, "d_notice_m", ApproachRestriction.d_notice_m))
 
 
 @dataclass(frozen=True)
 class BrakingCurve(BrakingParams, Restriction, name="braking"):
-    """How fast the body may come near, so that it could stop, or touch gently; compiled in `line`."""
+    """Limit on the approach speed, so that the arm can stop, or touch gently; compiled in `line`."""

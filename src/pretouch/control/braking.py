@@ -1,10 +1,10 @@
-"""The braking curve: how fast the body may come near, so that it could stop, or touch gently.
+"""The braking curve: the approach speed from which the arm can still stop, or touch gently.
 
-Along the normal the closing speed v, the object's own included, keeps v <= sqrt(v_c^2 + 2 a max(0, d - v tau - m)),
-from which it can brake at a to the touch speed v_c before the object is reached, tau later than measured and m nearer
-than seen. A row G qd <= h of that is kept for each unit and link. It appears with the speed the arm has, tightens at
-one rate and gives way at another, also when its object is no longer seen; so no row moves the command by a step, but
-for what is so near that the arm could not slow at that rate before it: there it brakes as hard as its joints may.
+Along the normal the closing speed v, the object's own included, keeps v <= sqrt(v_c^2 + 2 a max(0, d - v tau - m)):
+the arm can brake at a to the touch speed v_c before it reaches the object, with a latency tau and a margin m. Each unit
+and link has a row G qd <= h for that. A row starts at the speed of the arm, tightens at one rate and loosens at
+another, also when its object is out of view; so no row changes the command by a step. The exception is an object so
+near that the arm could not slow down at that rate: there it brakes as hard as its joints may.
 """
 
 from typing import Annotated, NamedTuple
@@ -13,21 +13,21 @@ import numpy as np
 
 from pretouch.cholesky import factor, forward
 from pretouch.compiled import compiled, inlined, kernel
-from pretouch.control.approach import Rows
+from pretouch.control.approach import ConstraintRows
 from pretouch.params.pretouch import REGIONS, BrakingParams, EffectiveMass, Tangential
 from pretouch.robot.kinematics import Chain, Kinematics, Mechanism, mass_matrix_into, row_along, tangents_of
 from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles
 
 _TANGENTS = 4  # two directions across the normal, both ways along each
 _MOST_ROWS = 2 + 2 * _TANGENTS
-"""Of a unit: of what it sees and one that fades, and those across the normal of each."""
+"""Rows of a unit: of its obstacle and of one that fades, with those across the normal of each."""
 
 
 class TouchLimits(NamedTuple):
-    """What a touch may be."""
+    """Limits of a touch."""
 
     force_n: float
-    """Force it may reach in the spring model [N]."""
+    """Largest force in the spring model [N]."""
     stiffness_n_m: float
     """Stiffness of the body region [N/m]."""
     mass_kg: float
@@ -37,7 +37,7 @@ class TouchLimits(NamedTuple):
 
 
 class Slots(NamedTuple):
-    """What is remembered of the rows of K units: first one slot a unit, then one for the row it had before."""
+    """Memory of the rows of K units: first a slot for each unit, then one for its row before."""
 
     link: Annotated[IntArray, "2 K"]
     """(2 K,) link of the row, -1 for none."""
@@ -60,33 +60,31 @@ def slots_init(units: int) -> Slots:
 
 
 class BrakingNumbers(NamedTuple):
-    """What the braking curve takes of parameters and limits."""
+    """Numbers of the braking curve, from parameters and limits."""
 
     curve: BrakingParams
     touch: TouchLimits
     mass: EffectiveMass
     weighs: bool
-    """Whether the touch speed follows from the arm's mass."""
+    """True if the touch speed follows from the arm's mass."""
     deadband_m_s: float
     """Closing speed of an object below which it counts as still [m/s]; infinite: its speed does not count."""
     across: Tangential
-    """How motion across the normal is restricted too: within no distance, where it is not."""
+    """Restriction of the motion across the normal; a distance of -inf stands for none."""
     fastest_m_s: float
-    """Speed from which on nothing is restricted [m/s]."""
+    """Speed above which nothing is restricted [m/s]."""
     period_s: float
 
 
 def braking_numbers(params: BrakingParams, speed: float, period: float) -> BrakingNumbers:
-    """Return what compiled code takes of the parameters, the task's speed [m/s], and the control period [s]."""
+    """Return the numbers for compiled code, with the task's speed [m/s] and the control period [s]."""
     mass, deadband = params.effective_mass or EffectiveMass(), params.closing_deadband_m_s
     region, across = REGIONS[mass.body_region], (params.tangential or Tangential()).numbers
     touch = TouchLimits(mass.allowed_force_n, region.stiffness_n_m, region.mass_kg, params.touch_speed_max_m_s)
     if params.tangential is None:
         across = across._replace(distance_m=-np.inf)  # no distance is below that
-    return BrakingNumbers(
-        params.numbers, touch, mass.numbers, params.effective_mass is not None,
-        np.inf if deadband is None else deadband, across, speed, period,
-    )  # fmt: skip
+    still, weighs = np.inf if deadband is None else deadband, params.effective_mass is not None
+    return BrakingNumbers(params.numbers, touch, mass.numbers, weighs, still, across, speed, period)
 
 
 @compiled
@@ -118,45 +116,43 @@ def inertia_factor(p: BrakingNumbers, kin: Kinematics, mechanism: Mechanism) -> 
 
 @inlined
 def braking_rows(
-    p: BrakingNumbers, slots: Slots, obstacles: Obstacles, chain: Chain, L: FloatArray, touch: TouchLimits,
-    deadband: float, untouched: int,
-) -> Rows:  # fmt: skip
-    """Change `slots` by one period, and return rows.
+    p: BrakingNumbers, slots: Slots, near: Obstacles, chain: Chain, L: FloatArray, touch: tuple[TouchLimits, float, int]
+) -> ConstraintRows:
+    """Update `slots` by one period, and return rows.
 
-    The first are those of the obstacles; then those that fade, then those across the normals.
+    The first rows belong to the obstacles; then come the fading ones, then those across the normals.
 
     Args:
         p: parameters.
         slots: rows so far.
-        obstacles: M that are near.
-        chain: what moves the points.
+        near: M obstacles.
+        chain: joints that move the points.
         L: `inertia_factor`.
-        touch: what a touch may be.
-        deadband: closing speed of an object below which it counts as still [m/s].
-        untouched: `Obstacles.unit` from which on an obstacle is not to be touched at any speed.
+        touch: limits of a touch, the closing speed of an object below which it counts as still [m/s], and the
+            `Obstacles.unit` from which obstacles must not be touched at any speed.
     """
-    half, s, distance = len(slots.link) // 2, p.curve, obstacles.body_distance
-    most, which, seen, count = _MOST_ROWS * half, np.empty(half, np.int64), np.zeros(half, np.bool_), 0
-    rows = Rows(np.empty((most, len(chain.qd))), np.empty(most), which, s.slack_weight)
-    for m in range(len(obstacles.unit)):
-        k = obstacles.unit[m]
+    half, s, distance, (limits, deadband, untouched) = len(slots.link) // 2, p.curve, near.body_distance, touch
+    most, which, present, count = _MOST_ROWS * half, np.empty(half, np.int64), np.zeros(half, np.bool_), 0
+    rows = ConstraintRows(np.empty((most, len(chain.qd))), np.empty(most), which, s.slack_weight)
+    for m in range(len(near.unit)):
+        k = near.unit[m]
         if not distance[m] < s.d_notice_m:
-            continue  # not counted as seen: a row that its unit has fades below
-        seen[k] = True
-        _take_slot(slots, k, half, obstacles.link[m])
+            continue  # counts as absent: the row of its unit fades below
+        present[k] = True
+        _take_slot(slots, k, half, near.link[m])
         for i in range(3):
-            slots.normal[k, i], slots.point[k, i] = obstacles.direction[m, i], obstacles.body_point[m, i]
+            slots.normal[k, i], slots.point[k, i] = near.direction[m, i], near.body_point[m, i]
         row = rows.G[count]
-        approach = row_along(chain, slots.link[k], slots.point[k], obstacles.direction[m], row)
-        # the row is n^T J, so the effective mass along the normal comes of it too
-        speed = touch_speed(mass_along(L, row), touch) if len(L) > 0 else touch.speed_max_m_s
+        approach = row_along(chain, slots.link[k], slots.point[k], near.direction[m], row)
+        # the row is n^T J, which gives the effective mass along the normal too
+        speed = touch_speed(mass_along(L, row), limits) if len(L) > 0 else limits.speed_max_m_s
         if k >= untouched:
             speed = 0.0
-        # an object that goes away allows no more; an infinite deadband leaves its speed out
-        own = max(0.0, obstacles.closing_speed[m] - deadband)
+        # a receding object allows no more; an infinite deadband ignores its speed
+        own = max(0.0, near.closing_speed[m] - deadband)
         cap = braking_cap(distance[m], speed, s.deceleration_m_s2, s.latency_s, s.margin_m)
         target = max(cap - own, -s.retreat_max_m_s)
-        # the same curve at the rate of tightening: the arm can still come down to it at that rate
+        # the same curve at the rate of tightening: the arm can still slow down to it at that rate
         last = braking_cap(distance[m], speed, s.tighten_m_s2, s.latency_s, s.margin_m) - own
         # Faster than that, smoothness comes second: the limit falls at once. With 0.0 it falls as far as a stop, while
         # a retreat (target < 0) is still approached at the rate of tightening.
@@ -167,21 +163,21 @@ def braking_rows(
             # v_t: linear from the slowest at the surface to the task's speed at that distance
             share = max(0.0, distance[m]) / p.across.distance_m
             across = p.across.speed_m_s + share * max(0.0, p.fastest_m_s - p.across.speed_m_s)
-        # it falls at once here; how hard that may slow the arm is bounded where the row is written
+        # it falls at once here; the deceleration of the arm is bounded where the row is written
         slots.across[k] = min(across, slots.across[k] + s.loosen_m_s2 * p.period_s)
         count += 1
-    with_fading = _fading_rows(p, slots, seen, chain, rows, count)
+    with_fading = _fading_rows(p, slots, present, chain, rows, count)
     all_rows = _rows_across(p, slots, chain, rows, with_fading)
-    return Rows(rows.G[:all_rows], rows.h[:all_rows], which[:count], s.slack_weight)
+    return ConstraintRows(rows.G[:all_rows], rows.h[:all_rows], which[:count], s.slack_weight)
 
 
 @kernel
 def _take_slot(slots: Slots, k: int, half: int, link: int) -> None:
-    """Make slot k that of a unit's row on a link: as it is, as it was before another link was nearer, or empty."""
+    """Give slot k to a unit's row on a link: its present row, its row before another link was nearer, or a new one."""
     if slots.link[k] == link:
         return
     last = half + k
-    # an object between two links may be nearer to each in turn: exchanged, both rows keep how tight they are
+    # an object between two links may be nearer to each in turn: the exchange keeps the limits of both rows
     if slots.link[last] == link:
         slots.link[k], slots.link[last] = slots.link[last], slots.link[k]
         slots.limit[k], slots.limit[last] = slots.limit[last], slots.limit[k]
@@ -191,7 +187,7 @@ def _take_slot(slots: Slots, k: int, half: int, link: int) -> None:
             slots.point[k, i], slots.point[last, i] = slots.point[last, i], slots.point[k, i]
         return
     _leave(slots, k, last)
-    # infinite, so that `_eased` begins at the speed the arm has
+    # infinite, so that `_eased` starts at the speed of the arm
     slots.link[k], slots.limit[k], slots.across[k] = link, np.inf, np.inf
 
 
@@ -206,17 +202,19 @@ def _leave(slots: Slots, k: int, last: int) -> None:
 
 
 @kernel
-def _fading_rows(p: BrakingNumbers, slots: Slots, seen: BoolArray, chain: Chain, rows: Rows, count: int) -> int:
-    """Add the rows of what is no longer seen to those there are; return how many there are then."""
+def _fading_rows(
+    p: BrakingNumbers, slots: Slots, present: BoolArray, chain: Chain, rows: ConstraintRows, count: int
+) -> int:
+    """Add the rows of obstacles that are out of view; return the number of rows."""
     half, s = len(slots.link) // 2, p.curve
     for k in range(half):
-        if not seen[k]:
+        if not present[k]:
             _leave(slots, k, half + k)
         last = half + k
         if slots.link[last] < 0:
             continue
-        # Nothing is known of the object any more: point and normal stay in the base frame while the link moves on under
-        # them, which from stop to free takes less than a second at the default rates.
+        # The object is out of view: point and normal stay in the base frame while the link moves on. From stop to free
+        # that takes less than a second at the default rates.
         slots.limit[last] += s.loosen_m_s2 * p.period_s
         slots.across[last] += s.loosen_m_s2 * p.period_s
         # what the curve allows at d_notice, but for latency, margin and touch speed, or the task's speed if more
@@ -225,15 +223,15 @@ def _fading_rows(p: BrakingNumbers, slots: Slots, seen: BoolArray, chain: Chain,
             slots.link[last] = -1
             continue
         approach = row_along(chain, slots.link[last], slots.point[last], slots.normal[last], rows.G[count])
-        # where the link has sped up along the old normal, this slows it no harder than a row tightens
+        # where the link is faster along the old normal, this slows it no harder than a row tightens
         rows.h[count] = max(slots.limit[last], approach - s.tighten_m_s2 * p.period_s)
         count += 1
     return count
 
 
 @kernel
-def _rows_across(p: BrakingNumbers, slots: Slots, chain: Chain, rows: Rows, count: int) -> int:
-    """Add (t + n) . v <= cap for four tangents t of each near point, n its normal: what retreats may slide as fast."""
+def _rows_across(p: BrakingNumbers, slots: Slots, chain: Chain, rows: ConstraintRows, count: int) -> int:
+    """Add (t + n) . v <= cap for four tangents t of each near point, n its normal: a retreating point may slide."""
     tangents, along = np.empty((2, 3)), np.empty(3)
     for k in range(len(slots.link)):
         if slots.link[k] < 0 or not slots.across[k] < p.fastest_m_s:
@@ -253,9 +251,9 @@ def _rows_across(p: BrakingNumbers, slots: Slots, chain: Chain, rows: Rows, coun
 
 @kernel
 def _eased(target: float, last: float, approach: float, p: BrakingNumbers) -> float:
-    """Limit between what is aimed at, how far it may loosen from the last, and how hard it may slow the arm."""
+    """Limit between the target, the rate of loosening from the last limit, and the rate of slowing the arm."""
     eased = min(target, last + p.curve.loosen_m_s2 * p.period_s)
-    return max(eased, approach - p.curve.tighten_m_s2 * p.period_s)  # comes last: it outweighs the target
+    return max(eased, approach - p.curve.tighten_m_s2 * p.period_s)  # last, so that it takes precedence over the target
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""What is asked of the arm in one step: along the path, or by a commander in its place."""
+"""Reference motion of one step: along the path, or by a commander in its place."""
 
 import math
 
@@ -12,52 +12,60 @@ from pretouch.types import FloatArray, RobotState
 from pretouch.values import value
 
 _TURN_RAD = 1.0
-"""Largest angle to an orientation that is asked for at once: the sine of `rotation_error` falls beyond a right one."""
+"""Largest angle to a requested orientation in one step: the sine of `rotation_error` falls beyond a right angle."""
 
 
 @value
-class Asked:
-    """What is asked before anything else limits it."""
+class MotionReference:
+    """Reference motion before any limit."""
 
     velocity: FloatArray
-    """(3,) of the end-effector origin [m/s]."""
+    """(3,) velocity of the end-effector origin [m/s]."""
     point: FloatArray
-    """(3,) where on the path it should be [m]; where it is, if a commander asks."""
+    """(3,) desired position on the path; the actual position with a commander [m]."""
     rotation_goal: FloatArray
     """(3, 3) R_O_ee to turn to."""
-    rotation_kept: FloatArray
-    """(3, 3) R_O_ee to hold from here on where nobody asks for another."""
+    lasting_rotation: FloatArray
+    """(3, 3) R_O_ee to hold after this step without another request."""
     qd: FloatArray | None = None
-    """(n,) joint velocities asked for in place of all that [rad/s]."""
+    """(n,) joint velocities that replace the other fields [rad/s]."""
 
 
-def asked_by(
-    desired: Desired, now: float, kin: Kinematics, robot: RobotState, model: RobotModel, held: FloatArray,
-    params: TaskParams, scale: float,
-) -> Asked:  # fmt: skip
-    """Ask for what a commander wants at an instant [s] times a factor on its speed.
+def reference_of(
+    desired: Desired,
+    now: float,
+    kin: Kinematics,
+    robot: RobotState,
+    model: RobotModel,
+    orientation: FloatArray,
+    params: TaskParams,
+    scale: float,
+) -> MotionReference:
+    """Return the reference of a commander's desired motion at an instant [s], with a factor on its speed.
 
-    `held` is R_O_ee (3, 3) to hold where the commander says nothing of it. A position is approached as the path is:
-    with `position_gain_1_s`, no faster than `speed_m_s` at the end-effector.
+    `orientation` is R_O_ee (3, 3) to hold without another request. A position is approached as the path is: with
+    `position_gain_1_s`, no faster than `speed_m_s` at the end-effector.
     """
     number, rate = _at(desired, now)
     R, here, gain = kin.rotation[model.ee], kin.position[model.ee], params.position_gain_1_s
     if desired.kind is DesiredKind.TWIST:
-        goal, lasting = (held, held) if not number[3:].any() else (_led(R, number[3:], params), R)
-        return Asked(scale * number[:3], here, goal, lasting)
+        goal, lasting = (
+            (orientation, orientation) if not number[3:].any() else (_leading_rotation(R, number[3:], params), R)
+        )
+        return MotionReference(scale * number[:3], here, goal, lasting)
     if desired.kind is DesiredKind.POSE:
         velocity = rate[:3] + gain * (number[:3] - here)
         share = scale * _share(velocity, rate[:3], params)
-        return Asked(share * velocity, here, _nearer(R, number[3:].reshape(3, 3)), R)
+        return MotionReference(share * velocity, here, _rotation_towards(R, number[3:].reshape(3, 3)), R)
     J, qd, share = model.ee_jacobian(kin)[:3], number, scale
     if desired.kind is DesiredKind.JOINT_POSITIONS:
         qd = rate + gain * (number - robot.q_commanded)
         share *= _share(J @ qd, J @ rate, params)
-    return Asked(share * (J @ qd), here, R, R, share * qd)
+    return MotionReference(share * (J @ qd), here, R, R, share * qd)
 
 
 def _at(desired: Desired, now: float) -> tuple[FloatArray, FloatArray]:
-    """Return what is asked at an instant, and how fast it changes [1/s]; 0 for velocities."""
+    """Return the desired value at an instant, and its rate of change [1/s]; 0 for velocities."""
     stamp, number = desired.stamp, desired.number
     i = int(np.searchsorted(stamp, now, side="right"))
     still = np.zeros(number.shape[1])
@@ -66,7 +74,7 @@ def _at(desired: Desired, now: float) -> tuple[FloatArray, FloatArray]:
     rate = (number[i] - number[i - 1]) / (stamp[i] - stamp[i - 1])
     between = number[i - 1] + rate * (now - stamp[i - 1])
     if desired.kind is DesiredKind.POSE:
-        between[3:] = number[i, 3:]  # what lies between two rotations element by element is none
+        between[3:] = number[i, 3:]  # an interpolation of the elements would be no rotation
     return between, rate
 
 
@@ -76,15 +84,15 @@ def _share(velocity: FloatArray, planned: FloatArray, params: TaskParams) -> flo
     return 1.0 if length <= fastest else fastest / length
 
 
-def _led(R: FloatArray, angular: FloatArray, params: TaskParams) -> FloatArray:
+def _leading_rotation(R: FloatArray, angular: FloatArray, params: TaskParams) -> FloatArray:
     """Return the orientation (3, 3) that the task's gain answers with an angular velocity (3,) [rad/s]."""
     speed = float(np.linalg.norm(angular))
     share = speed / params.orientation_gain_1_s if params.orientation_gain_1_s > 0.0 else 0.0
     return rotation_about(angular / speed, math.asin(min(1.0, share))) @ R
 
 
-def _nearer(R: FloatArray, goal: FloatArray) -> FloatArray:
-    """Return the goal, or what lies on the way to it if it is far."""
+def _rotation_towards(R: FloatArray, goal: FloatArray) -> FloatArray:
+    """Return the goal, or an orientation on the way to a distant one."""
     difference = goal @ R.T
     angle = math.acos(max(-1.0, min(1.0, 0.5 * (float(np.trace(difference)) - 1.0))))
     if angle <= _TURN_RAD:

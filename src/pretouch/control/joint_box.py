@@ -1,4 +1,4 @@
-"""The range of joint velocities that keeps position, velocity and acceleration limits, now and ever after.
+"""The range of joint velocities that keeps position, velocity and acceleration limits, now and later.
 
 A velocity command is held for one period. It is viable if it keeps all limits until the end of its period, and full
 braking, which takes `qdd_max * period` off it in each further period, keeps them ever after. No limit rises towards the
@@ -30,9 +30,9 @@ class JointLimits:
     qdd_max: FloatArray
     """(n,) [rad/s^2]"""
     period: float
-    """Time a joint velocity command is held [s]."""
+    """Duration of a joint velocity command [s]."""
     envelope: SpeedEnvelope | None = None
-    """What the speed may be at a position, if it depends on it."""
+    """Speed limits that depend on the position; None without any."""
     table: FloatArray = field(init=False, repr=False, compare=False)
     """(9, n) all of the above for compiled code, a joint a column; a slope of 0 stands for no envelope."""
 
@@ -49,7 +49,7 @@ def joint_limits(model: RobotModel, margin: float, period: float) -> JointLimits
 
     Args:
         model: the arm.
-        margin: how far inside the arm's own the limits that depend on the position lie, its envelope included [rad].
+        margin: distance inside the arm's own limits of those that depend on the position, the envelope included [rad].
         period: [s].
 
     Raises ParameterError for a margin that leaves a joint nothing of its range.
@@ -111,7 +111,7 @@ def viable_speed_in_envelope(distance: float, offset: float, slope: float, accel
 
 @kernel
 def _before_period(k: float, x: float, o: float, b: float) -> float:
-    """F(k) of `viable_speed_in_envelope`; a command that full braking has brought to rest by then keeps any limit."""
+    """F(k) of `viable_speed_in_envelope`; a command that is at rest by then after full braking keeps any limit."""
     p, z = o + b * (k + 1.0), max(b * (2.0 * x - k * (k + 1.0)), 0.0)
     # u = sqrt(p^2 + z) - p, the positive root of u^2 + 2 p u = z, written without the difference of near numbers
     return k + z / (p + np.sqrt(p**2 + z)) if z > 0.0 else k
@@ -136,7 +136,7 @@ def joint_box(q: FloatArray, qd: FloatArray, table: FloatArray) -> tuple[FloatAr
         reach = table[3, i] * table[4, i]
         down, up = _viable(q[i], table, i)
         slowest, fastest = qd[i] - reach, qd[i] + reach
-        # acceleration last, so that it wins: an arm past what is viable brakes at its limit, and lower <= upper always
+        # acceleration last, so that it wins: an arm beyond the viable range brakes at its limit, and lower <= upper
         lower[i] = np.minimum(np.maximum(down, slowest), fastest)
         upper[i] = np.minimum(np.maximum(up, slowest), fastest)
     return lower, upper, brake(qd, lower, upper, table)

@@ -1,4 +1,4 @@
-"""Paths for the end-effector, driven by a phase, the arc length travelled and never the time; and eqs. 3 and 4."""
+"""Paths of the end-effector by their phase, the arc length travelled, never by time; and eqs. 3 and 4."""
 
 import math
 from bisect import bisect_right
@@ -24,7 +24,7 @@ class Path(Protocol):
 
     @property
     def closed(self) -> bool:
-        """Whether the end is the start, so that it is run again and again."""
+        """True if the end is the start, so that the path repeats."""
         ...
 
     def point(self, phase: float) -> FloatArray:
@@ -37,13 +37,13 @@ class Path(Protocol):
 
 
 _LARGEST = 1000.0
-"""Largest number that describes a path [m, rad]: any larger one is a mistake."""
+"""Largest number of a path [m, rad]: a larger one is a mistake."""
 
 _SHORTEST = 1e-6
 """Shortest radius or segment [m]."""
 
 _PLACES = 400
-"""Places of a path that are looked at for where to join it."""
+"""Points of a path among which the nearest is chosen to join it."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Circle:
     radius: float = 0.25
     """[m]"""
     start_angle: float = 0.0
-    """Where it begins, from +y towards +z [rad]."""
+    """Angle of the start, from +y towards +z [rad]."""
 
     def __post_init__(self) -> None:
         if not (np.all(np.abs([*self.center, self.start_angle]) <= _LARGEST) and _SHORTEST <= self.radius <= _LARGEST):
@@ -71,7 +71,7 @@ class Circle:
 
     @property
     def closed(self) -> bool:
-        """Whether it is run again and again: always."""
+        """True: the circle repeats."""
         return True
 
     def point(self, phase: float) -> FloatArray:
@@ -87,7 +87,7 @@ class Circle:
 
 
 class WayPoints:
-    """Straight segments through given points; a line is the path through two."""
+    """Straight segments through points; a line is the path through two."""
 
     def __init__(self, points: FloatArray, closed: bool = False) -> None:
         """Take W >= 2 points (W, 3) [m], base frame; `closed` leads from the last back to the first."""
@@ -111,7 +111,7 @@ class WayPoints:
 
     @property
     def points(self) -> FloatArray:
-        """The given points (W, 3) [m]."""
+        """Way-points (W, 3) [m]."""
         return np.array(self._corners[: len(self._corners) - self.closed])
 
     def _locate(self, phase: float) -> tuple[int, float]:
@@ -139,34 +139,34 @@ def segment(start: tuple[float, float, float], end: tuple[float, float, float]) 
 
 
 def nearest_phase(path: Path, position: FloatArray) -> float:
-    """Return where the path comes nearest to a position (3,) [m], to within a two-hundredth of its length."""
+    """Return the phase nearest to a position (3,) [m], to within a two-hundredth of the path's length."""
     phases = np.linspace(0.0, path.length, _PLACES, endpoint=not path.closed)
     away = [float(((path.point(phase) - position) ** 2).sum()) for phase in phases]
     return float(phases[int(np.argmin(away))])
 
 
 class OnPath(NamedTuple):
-    """The path at the phase of the step."""
+    """The path at the phase of a step."""
 
     phase: Cell
     """Arc length travelled along the path [m]."""
     point: Annotated[FloatArray, 3]
-    """(3,) where on it the end-effector should be [m]."""
+    """(3,) desired position of the end-effector [m]."""
     tangent: Annotated[FloatArray, 3]
     """(3,) unit tangent there."""
     velocity: Annotated[FloatArray, 3]
-    """(3,) task velocity x_d, before anything slows it [m/s]."""
+    """(3,) task velocity x_d, before any reduction [m/s]."""
     forward: Cell
     """Its speed along the path, before it is limited [m/s]."""
     scale: Cell
     """Factor on the velocity, of eqs. 3 and 4."""
 
 
-class Pace(NamedTuple):
-    """How far along the path the arm is, and how fast it may go."""
+class PathPace(NamedTuple):
+    """Phase on the path, and the speed that is allowed along it."""
 
     scale: Cell
-    """Factor of eq. 4 when it last fell or kept pace."""
+    """Factor of eq. 4 when it last fell or stayed."""
     cycles: IntCell
     """Cycles since then."""
     phase: Cell
@@ -177,10 +177,10 @@ class Pace(NamedTuple):
 
 @kernel
 def follow(path: OnPath, speed: float, here: FloatArray, p: TaskParams) -> None:
-    """Write the task velocity x_d: along the path, and towards it, no faster than the speed allowed by now [m/s].
+    """Write the task velocity x_d: along the path, and towards it, no faster than `speed` [m/s].
 
-    Off the path the forward part shrinks, to nothing at `off_path_m`: the arm first returns to where it left. `here`
-    (3,) is the end-effector origin [m].
+    Off the path the forward part shrinks, to zero at `off_path_m`: the arm first returns to the point where it left.
+    `here` (3,) is the end-effector origin [m].
     """
     velocity, square, size = path.velocity, 0.0, 0.0
     for i in range(3):
@@ -197,12 +197,12 @@ def follow(path: OnPath, speed: float, here: FloatArray, p: TaskParams) -> None:
 
 @kernel
 def advance(phase: float, path: OnPath, commanded: FloatArray, period: float) -> float:
-    """Move the phase [m] on by one period [s] of the forward speed, less what the arm falls short of it, never back.
+    """Advance the phase [m] by one period [s] of the forward speed, less the arm's deficit, never back.
 
-    Slowing or blocking the arm so slows the phase. Motion back to the path is no progress along it, so an arm pushed
-    ahead or back meets the path where it left. `commanded` (3,) is the velocity of the end-effector origin [m/s].
+    So a slowed or blocked arm slows the phase. Motion back to the path is no progress along it: an arm that was pushed
+    ahead or back returns to the point where it left. `commanded` (3,) is the velocity of the end-effector origin [m/s].
     """
-    missing = 0.0  # what eqs. 3-4, the rows and the joint box took from it
+    missing = 0.0  # the reduction by eqs. 3-4, the rows and the joint box
     for i in range(3):
         missing += (path.velocity[i] - commanded[i]) * path.tangent[i]
     return phase + max(0.0, path.forward[0] - max(0.0, missing)) * period
@@ -214,18 +214,18 @@ def speed_scale(distance: float, d_max: float) -> float:
 
     `distance` [m] is from the end-effector origin to the nearest obstacle, infinite if there is none.
     """
-    # whichever way the arm moves: eq. 3 slows a retreat as well (docs/explanation/paper.md, slow-down while retreating)
+    # in any direction of motion: eq. 3 slows a retreat too (docs/explanation/paper.md, slow-down while retreating)
     return min(1.0, distance / d_max)
 
 
 @kernel
-def reduce_speed(pace: Pace, fresh: float, l_max: int) -> float:
-    """One cycle of eqs. 3 and 4: change what is remembered, and return the factor on the end-effector velocity.
+def reduce_speed(pace: PathPace, fresh: float, l_max: int) -> float:
+    """Run one cycle of eqs. 3 and 4: update `pace`, and return the factor on the end-effector velocity.
 
-    After a loss the factor s + (1 - s) l_obs / l_max of eq. 4 of the paper goes back to full speed in l_max cycles. The
-    fresh factor, of eq. 3 or of a silent unit, holds at once where it is the smaller one, and rises no faster than
-    that: whether the nearest obstacle vanished, was seen again farther away, or left another one in view, the speed
-    never jumps up.
+    After a loss the factor s + (1 - s) l_obs / l_max of eq. 4 of the paper returns to full speed in l_max cycles. The
+    fresh factor, by eq. 3 or by a silent unit, applies at once where it is smaller, and rises no faster than that. So
+    the speed never jumps up, whether the nearest obstacle vanishes, reappears farther away, or leaves another one in
+    view.
     """
     scale, cycles = pace.scale[0], pace.cycles[0] + 1
     faded = scale + (1.0 - scale) * min(1.0, cycles / l_max)

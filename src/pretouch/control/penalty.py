@@ -2,10 +2,10 @@
 
     minimise  1/2 x^T H x + f^T x + w/2 sum_k max(0, G_k x - h_k)^2   subject to  lower <= x <= upper
 
-A general solver carries each violated soft row in its working set: with all of 1000 rows violated, as in a crowd, that
-takes DAQP 0.2 s. Here a violated row only adds to the n x n Hessian, so a step costs no more than a look at the rows.
-The cost is piecewise quadratic and convex, so Newton steps, each to the least of one piece within the box and shortened
-by an exact line search where it would overshoot, end at the minimum after finitely many.
+A general solver keeps each violated soft row in its working set: with 1000 violated rows, as in a crowd, DAQP takes
+0.2 s. Here a violated row only adds to the n x n Hessian, so a step costs no more than one pass over the rows. The cost
+is piecewise quadratic and convex: Newton steps, each to the minimum of one piece within the box, shortened by an exact
+line search where they overshoot, reach the minimum in finitely many steps.
 """
 
 from typing import NamedTuple
@@ -21,14 +21,14 @@ _ROUNDING = 1e-13
 """Relative size below which a difference is rounding."""
 
 _REST = 1e-11
-"""Length of a step from which no other is needed [rad/s]."""
+"""Length of a step below which it is the last one [rad/s]."""
 
 _LEAST = 1e-6
-"""Velocity below which rounding is not taken to shrink further [rad/s]: at an answer of 0 it would vanish."""
+"""Velocity below which rounding counts as constant [rad/s]: at a solution of 0 it would vanish."""
 
 
-class Problem(NamedTuple):
-    """What is minimised."""
+class QuadraticProgram(NamedTuple):
+    """The problem to be minimised."""
 
     H: FloatArray
     """(n, n), positive definite."""
@@ -47,18 +47,18 @@ class Problem(NamedTuple):
 
 
 class Minimum(NamedTuple):
-    """Room for the answer."""
+    """Arrays for the solution."""
 
     x: FloatArray
-    """(n,) where it is."""
+    """(n,) minimum."""
     slack: FloatArray
-    """(K,) by how much each row is violated."""
+    """(K,) violation of each row."""
     multipliers: FloatArray
-    """(n + K,) those of box and rows, positive at an upper and negative at a lower bound."""
+    """(n + K,) multipliers of box and rows, positive at an upper and negative at a lower bound."""
 
 
 class _Piece(NamedTuple):
-    """The piece of the cost that some x is on: 1/2 x^T hessian x + linear^T x, and the rows (K,) violated there."""
+    """The piece of the cost at some x: 1/2 x^T hessian x + linear^T x, and the rows (K,) violated there."""
 
     hessian: FloatArray
     linear: FloatArray
@@ -66,22 +66,22 @@ class _Piece(NamedTuple):
 
 
 @inlined
-def minimise(problem: Problem, budget: int, answer: Minimum) -> int:
-    """Write the minimum, and say how that ended; `budget` counts the factorisations after which to give up."""
+def minimise(problem: QuadraticProgram, budget: int, answer: Minimum) -> int:
+    """Write the minimum and return the ending; `budget` is the largest number of factorisations."""
     H, f, lower, upper, G, h = problem.H, problem.f, problem.lower, problem.upper, problem.G, problem.h
     x = answer.x
     if not finite(problem):
         return NOT_FINITE
     n = len(x)
     for i in range(n):
-        # the middle of the box is the last command, as a rule, and the next one near it
+        # the middle of the box is the last command, as a rule, and close to the next one
         x[i] = 0.5 * (lower[i] + upper[i])
     which = possible_rows(G, h, lower, upper)  # slack and multipliers of all others are 0
     at_bound, piece = np.zeros(n, np.int64), _Piece(H.copy(), f.copy(), np.zeros(len(h), np.bool_))
     _take_violated(problem, which, x, piece)
     y, left = x.copy(), budget
     while True:
-        # y is the least of the piece that x is on; if another piece rules at y, the cost may rise again before y
+        # y is the minimum of the piece at x; if y is on another piece, the cost may rise again before y
         status, left = _box_minimum(piece.hessian, piece.linear, lower, upper, y, at_bound, left)
         if status != SOLVED:
             return status
@@ -92,7 +92,7 @@ def minimise(problem: Problem, budget: int, answer: Minimum) -> int:
         for i in range(n):
             moved = max(moved, abs(y[i] - x[i]) / (1.0 + abs(x[i])))
         if moved <= 1e-15:
-            break  # several rows meet here: no way leads further down
+            break  # several rows meet here: no direction leads further down
         for i in range(n):
             x[i] = y[i]
             if at_bound[i] != 0 and lower[i] < x[i] < upper[i]:
@@ -109,7 +109,7 @@ def minimise(problem: Problem, budget: int, answer: Minimum) -> int:
 
 @kernel
 def possible_rows(G: FloatArray, h: FloatArray, lower: FloatArray, upper: FloatArray) -> IntArray:
-    """Indices of the rows G x <= h that some x of the box violates; all others can be left out of any problem in it."""
+    """Return the rows G x <= h that some x of the box violates; a problem in the box needs no others."""
     which, count = np.empty(len(h), np.int64), 0
     for k in range(len(h)):
         most = 0.0  # the largest G_k x of the box, which is at one of its corners
@@ -122,27 +122,27 @@ def possible_rows(G: FloatArray, h: FloatArray, lower: FloatArray, upper: FloatA
 
 
 @inlined
-def finite(problem: Problem) -> bool:
-    """Whether all numbers of a problem are finite."""
+def finite(problem: QuadraticProgram) -> bool:
+    """Return whether all numbers of a problem are finite."""
     H, f, lower, upper, G, h = problem.H, problem.f, problem.lower, problem.upper, problem.G, problem.h
-    # A number that is not finite spoils any sum of products with zero. This comes first: what is NaN would compare as a
-    # row that holds.
-    spoilt = 0.0
+    # A number that is not finite makes any sum of products with zero NaN. This comes first: in a comparison, NaN would
+    # pass for a row that holds.
+    total = 0.0
     for i in range(len(f)):
-        spoilt += 0.0 * f[i] + 0.0 * lower[i] + 0.0 * upper[i]
+        total += 0.0 * f[i] + 0.0 * lower[i] + 0.0 * upper[i]
         for j in range(len(f)):
-            spoilt += 0.0 * H[i, j]
+            total += 0.0 * H[i, j]
     for k in range(len(h)):
         row = 0.0 * h[k]  # a sum of its own: one after the other, all of them would wait for each other
         for i in range(len(f)):
             row += 0.0 * G[k, i]
-        spoilt += row
-    return bool(spoilt == 0.0)
+        total += row
+    return bool(total == 0.0)
 
 
 @kernel
 def _product(A: FloatArray, k: int, x: FloatArray, start: float) -> float:
-    """Row k of A times x, added to what it starts from."""
+    """Return row k of A times x, plus a start value."""
     for i in range(len(x)):
         start += A[k, i] * x[i]
     return start
@@ -150,27 +150,27 @@ def _product(A: FloatArray, k: int, x: FloatArray, start: float) -> float:
 
 @kernel
 def excess_of(G: FloatArray, h: FloatArray, k: int, x: FloatArray) -> float:
-    """By how much row k is violated at x; negative where it holds."""
+    """Return the violation of row k at x; negative where it holds."""
     return _product(G, k, x, -h[k])
 
 
 @kernel
 def excesses(G: FloatArray, h: FloatArray, x: FloatArray, slack: FloatArray) -> None:
-    """Write by how much each row is violated at x, zero where it holds."""
+    """Write the violation of each row at x, zero where it holds."""
     for k in range(len(h)):
         slack[k] = max(0.0, excess_of(G, h, k, x))
 
 
 @kernel
-def _take_violated(problem: Problem, which: IntArray, x: FloatArray, piece: _Piece) -> None:
-    """Make the piece of the cost the one that x is on; only the rows `which` are looked at."""
+def _take_violated(problem: QuadraticProgram, which: IntArray, x: FloatArray, piece: _Piece) -> None:
+    """Move the piece of the cost to x; only the rows `which` are checked."""
     H, f, G, h, weight = problem.H, problem.f, problem.G, problem.h, problem.weight
     hessian, linear, violated = piece.hessian, piece.linear, piece.violated
     n, dropped = len(x), False
     for k in which:
         dropped = dropped or (violated[k] and not excess_of(G, h, k, x) > 0)
     if dropped:
-        # to take a row out again would leave the rounding of its large terms
+        # the subtraction of a row would leave the rounding of its large terms
         for i in range(n):
             linear[i] = f[i]
             for j in range(n):
@@ -190,7 +190,7 @@ def _take_violated(problem: Problem, which: IntArray, x: FloatArray, piece: _Pie
 
 @kernel
 def _differs(G: FloatArray, h: FloatArray, which: IntArray, x: FloatArray, violated: BoolArray) -> bool:
-    """Whether another piece of the cost rules at x, but for rows that x meets to rounding."""
+    """Return whether x is on another piece of the cost, apart from rows that hold to rounding."""
     for k in which:
         excess = excess_of(G, h, k, x)
         if (excess > 0) != violated[k] and abs(excess) > _ROUNDING * (1.0 + abs(h[k])):
@@ -199,13 +199,13 @@ def _differs(G: FloatArray, h: FloatArray, which: IntArray, x: FloatArray, viola
 
 
 @inlined
-def _shorten(problem: Problem, which: IntArray, x: FloatArray, y: FloatArray) -> None:
-    """Draw y back towards x to the least of the cost on the way from x to it."""
+def _shorten(problem: QuadraticProgram, which: IntArray, x: FloatArray, y: FloatArray) -> None:
+    """Move y back towards x, to the minimum of the cost between both."""
     H, f, G, h, weight = problem.H, problem.f, problem.G, problem.h, problem.weight
     n, d = len(x), np.empty(len(x))
     for i in range(n):
         d[i] = y[i] - x[i]
-    # along the way the slope of the cost is start + t bend + w sum rate_k max(0, excess_k + t rate_k): it only rises
+    # between both the slope of the cost is start + t bend + w sum rate_k max(0, excess_k + t rate_k): it only rises
     start, bend = 0.0, 0.0
     for i in range(n):
         start += _product(H, i, x, f[i]) * d[i]
@@ -227,7 +227,7 @@ def _shorten(problem: Problem, which: IntArray, x: FloatArray, y: FloatArray) ->
         after = t - slope / rise
         if abs(after - t) <= _ROUNDING:
             break
-        # where this piece of the slope vanishes, or half-way, if it ends before
+        # the zero of this piece of the slope, or half-way, if the piece ends before
         t = after if low < after < high else 0.5 * (low + high)
     for i in range(n):
         y[i] = x[i] + t * d[i]
@@ -237,7 +237,7 @@ def _shorten(problem: Problem, which: IntArray, x: FloatArray, y: FloatArray) ->
 def _slope(
     start: float, bend: float, excess: FloatArray, rate: FloatArray, weight: float, t: float
 ) -> tuple[float, float]:
-    """Slope of the cost at t on the way of `_shorten`, and how fast it rises there."""
+    """Return the slope of the cost at t on the line of `_shorten`, and its rate of change."""
     slope, rise = 0.0, 0.0
     for m in range(len(excess)):
         now = excess[m] + t * rate[m]
@@ -250,11 +250,11 @@ def _slope(
 @kernel
 def _box_minimum(
     H: FloatArray, f: FloatArray, lower: FloatArray, upper: FloatArray, x: FloatArray, at_bound: IntArray, left: int
-) -> tuple[int, int]:  # fmt: skip
-    """Move x within the box to the least of 1/2 x^T H x + f^T x, by an active-set method.
+) -> tuple[int, int]:
+    """Move x within the box to the minimum of 1/2 x^T H x + f^T x, by an active-set method.
 
-    `at_bound` (n,) says which joints are held at their upper (1) or lower bound (-1). Returns how it ended and the
-    factorisations that are left of those allowed.
+    `at_bound` (n,) marks the joints at their upper (1) or lower bound (-1). Returns the ending and the number of
+    factorisations that are left.
     """
     n = len(x)
     gradient, step, L = np.empty(n), np.empty(n), np.empty((n, n))
@@ -287,10 +287,10 @@ def _box_minimum(
             x[block] = upper[block] if step[block] > 0 else lower[block]
             last = np.inf
         elif length > _REST and length < 0.5 * last:
-            # a second step takes off what rounding left of the first
+            # a second step removes the rounding of the first
             last = length
         else:
-            # let go of the bound that is pulled at most, if any
+            # release the bound with the largest pull, if any
             pull, most = _ROUNDING * size, -1
             for i in range(n):
                 if at_bound[i] * gradient[i] > pull:
@@ -320,7 +320,7 @@ def _newton_step(H: FloatArray, gradient: FloatArray, free: IntArray, L: FloatAr
 
 
 @inlined
-def _certify(problem: Problem, piece: _Piece, at_bound: IntArray, answer: Minimum) -> None:
+def _certify(problem: QuadraticProgram, piece: _Piece, at_bound: IntArray, answer: Minimum) -> None:
     """Write slack (K,) and multipliers (n + K,) of the minimum x."""
     hessian, linear, x, slack, multipliers = piece.hessian, piece.linear, answer.x, answer.slack, answer.multipliers
     n = len(x)
@@ -329,5 +329,5 @@ def _certify(problem: Problem, piece: _Piece, at_bound: IntArray, answer: Minimu
         multipliers[n + k] = problem.weight * slack[k]  # derivative of w/2 s^2
     for i in range(n):
         pull = _product(hessian, i, x, linear[i])
-        # H x + f + G^T (w s) + multiplier = 0 at the minimum; rounding may turn a sign, which the max takes off
+        # H x + f + G^T (w s) + multiplier = 0 at the minimum; the max removes a wrong sign by rounding
         multipliers[i] = at_bound[i] * max(0.0, -at_bound[i] * pull)

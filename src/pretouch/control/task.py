@@ -1,4 +1,4 @@
-"""The task: the cost of eq. 2, and what the arm does with the joint motion that leaves its task as it is."""
+"""The task: the cost of eq. 2, and the joint motion in the null space of the task."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ _DAMPING = 1e-6
 
 @kernel
 def twist(velocity: FloatArray, rotation: FloatArray, goal: FloatArray, gain: float) -> FloatArray:
-    """Task velocity (6,) [m/s, then rad/s] where the orientation R_O_ee (3, 3) is held, with a gain [1/s]."""
+    """Return the task velocity (6,) [m/s, then rad/s] that holds the orientation R_O_ee (3, 3) with a gain [1/s]."""
     error, both = rotation_error(rotation, goal), np.empty(6)
     for i in range(3):
         both[i], both[3 + i] = velocity[i], gain * error[i]
@@ -60,7 +60,7 @@ def cost_into(
     velocities qd_mid = (q_mid - q) / t (n,) [rad/s] that would reach the middle of the joint ranges in the time t.
 
     With a motion z (n,) [rad/s] for the null space of the task, k/2 |N (z - qd)|^2 is added, N the projector onto it.
-    With `mid_joint_projected` qd_mid is part of z, in place of a term of its own. Eq. 2 as it is has z (0,).
+    With `mid_joint_projected` qd_mid is part of z, in place of a term of its own. The paper's eq. 2 has z (0,).
     """
     n, projected, k = len(q), p.mid_joint_projected, p.mid_joint_gain
     mu, alone = damping(manipulability(J), p.damping_max, p.manipulability_threshold), 0.0 if projected else k
@@ -91,9 +91,9 @@ def cost_into(
 
 @kernel
 def projector(J: FloatArray) -> FloatArray:
-    """N = I - J^T (J J^T + c I)^-1 J (n, n), symmetric: onto joint velocities that leave the task of J (m, n) alone.
+    """Return N = I - J^T (J J^T + c I)^-1 J (n, n), symmetric: the projector onto the null space of J (m, n).
 
-    Damped by c, so that it is defined everywhere: J N v is c (J J^T + c I)^-1 J v, nothing away from singularities.
+    The damping c makes it defined everywhere: J N v is c (J J^T + c I)^-1 J v, zero away from singularities.
     """
     m, n = J.shape
     S, L, X, N = _DAMPING * np.eye(m), np.empty((m, m)), np.empty((n, m)), np.eye(n)
@@ -119,7 +119,7 @@ def away(
     last: FloatArray, G: FloatArray, which: IntArray, obstacles: Obstacles, moved_by: BoolArray, p: NullSpaceMotion,
     period: float,
 ) -> FloatArray:  # fmt: skip
-    """Joint velocities (n,) [rad/s] that take body points before the hand away from what is near.
+    """Return joint velocities (n,) [rad/s] that move body points before the hand away from obstacles.
 
     Each row g = n^T J of G (R, n), that of obstacle `which` (R,), adds -g v / |g|^2 with v = v_0 (1 - d / d_0)^2: alone
     it would move its point away at v. The sum, and its change from `last` (n,) in a period, are bounded.
@@ -130,17 +130,17 @@ def away(
     for r in range(len(which)):
         m = which[r]
         if distance[m] >= within or sum(moved_by[link[m]]) == n:
-            continue  # far, or of the hand, whose place is the task's
+            continue  # far, or on the hand, whose motion is the task's
         size2 = 0.0
         for j in range(n):
             size2 += G[r, j] * G[r, j]
         speed = p.speed_m_s * (1.0 - max(0.0, distance[m]) / within) ** 2
-        # -g v / |g|^2 is the shortest z with g z = -v; the sum over several rows meets none of them exactly
-        # a point that hardly moves asks for no more than one 0.1 m off an axis
+        # -g v / |g|^2 is the shortest z with g z = -v; a sum over several rows fulfils none of them exactly;
+        # a point that hardly moves counts as one 0.1 m off an axis
         for j in range(n):
             z[j] -= G[r, j] * speed / max(size2, 0.01)
     _shorten(z, p.joint_rad_s)
-    # An obstacle that appears, or goes, changes z by a step: the arm follows at a bounded rate.
+    # An obstacle that appears or vanishes changes z by a step: the arm follows at a bounded rate.
     step = z - last
     _shorten(step, p.rate_rad_s2 * period)
     return last + step

@@ -1,4 +1,4 @@
-"""Blind spots: patches of surface on which hardly anything is seen in time, and what to call them."""
+"""Blind spots: patches of surface where hardly any approach is seen in time, and their names."""
 
 from dataclasses import dataclass
 
@@ -10,14 +10,14 @@ from pretouch.coverage.ways import Ways
 from pretouch.types import FloatArray, IntArray
 
 BLIND = 0.1
-"""A point is blind if less than this share of the ways to it is seen in time."""
+"""Share of the ways to a point seen in time below which the point is blind."""
 _AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 _SIDES = ("front", "back", "left", "right", "upper side", "underside")
 """Names of the same directions in the base frame: x to the front, y to the left, z upwards."""
 _STEADY = 0.5
-"""Length of the mean normal, over the postures, from which on a patch has a side of its own in the base frame."""
+"""Length of the mean normal over the postures from which a patch has a side in the base frame."""
 _NEIGHBOURS = 2.5
-"""Points nearer than this many times the side of the square that each stands for are of one patch."""
+"""Largest distance of neighbours in a patch, relative to the side of the square of each point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,24 +26,24 @@ class BlindSpot:
 
     link: str
     facing: str
-    """Axis of the link's frame that it faces."""
+    """Axis of the link's frame towards which it faces."""
     side: str
-    """Side of the arm in the base frame, or '' where that changes with the posture."""
+    """Side of the arm in the base frame, or '' if that changes with the posture."""
     area_m2: float
     center: FloatArray
-    """(3,) its middle, link frame [m]."""
+    """(3,) centre, link frame [m]."""
     share: float
     """Share of the ways to it that are seen in time."""
 
     @property
     def sentence(self) -> str:
-        """Where it is, in plain words."""
+        """Place in plain words."""
         its, place = f"its {self.side}, " if self.side else "", ", ".join(f"{x:.2f}" for x in self.center)
         return f"{self.link}, {its}facing {self.facing} at ({place}) m of the link: {1e4 * self.area_m2:.0f} cm^2"
 
 
 def blind_spots(ways: Ways, coverage: Coverage) -> tuple[BlindSpot, ...]:
-    """Find the patches of blind points that hang together and face one way, the largest first."""
+    """Return the connected patches of blind points that face one way, the largest first."""
     surface = ways.surface
     blind = np.flatnonzero(coverage.point_share < BLIND)
     side = 6 * surface.link + _axis(surface.normal)  # a number for each axis of each link
@@ -73,5 +73,5 @@ def _spot(ways: Ways, coverage: Coverage, points: IntArray) -> BlindSpot:
         _SIDES[int(_axis(in_base[None])[0])] if np.linalg.norm(in_base) > _STEADY else "",
         float(area.sum()),
         center,
-        float(coverage.seen[points].sum() / coverage.free[points].sum()),
+        float(coverage.visible[points].sum() / coverage.free[points].sum()),
     )

@@ -18,7 +18,7 @@ _VIEWS = (("from the front left", 20, 40), ("from the back right", 20, 220), ("f
 _SPACING_M = 0.012
 """Distance between the dots that the surface is drawn by [m]."""
 _BEAM_M = np.linspace(0.0, 0.15, 16)
-"""Where on the rays of a beam dots are [m]; the first is the unit."""
+"""Distances of dots on the rays of a beam [m]; the first is the unit."""
 _NEW, _OLD, _NOTHING = "tab:red", "black", (0.75, 0.75, 0.75, 1.0)
 _SMOOTH = 6
 """Surface points over which the colour of a dot is averaged."""

@@ -1,4 +1,4 @@
-"""One measurement of coverage: what a skin sees in time of ways and surface, for each link and for the arm.
+"""One measurement of coverage: shares of ways and surface that a skin sees in time, for each link and for the arm.
 
 It is averaged over postures of a workspace: on the paper's paths, or in the joints' whole range.
 """
@@ -17,69 +17,69 @@ from pretouch.sim.paper_scenes import placement_for
 from pretouch.types import BoolArray, FloatArray
 
 COVERED = 0.5
-"""Share of the ways to a surface point that has to be seen for the point to count as covered."""
+"""Share of the ways to a surface point seen in time from which the point is covered."""
 _EACH = 4
 """Ways to each point of the surface in each posture."""
 KINDS = ("circle", "line", "paths", "joints")
 _DRAWN = 40
-"""Postures drawn at most for each that is wanted: many meet the arm itself or the floor."""
+"""Random postures for each accepted one, at most: in many the arm collides with itself or the floor."""
 
 
 @dataclass(frozen=True)
 class LinkShare:
-    """What is seen in time of objects that approach one link, or the whole arm."""
+    """Coverage of one link, or of the whole arm."""
 
     name: str
     area_m2: float
     """Outer surface that a ball can touch [m^2]."""
     ways: float
-    """Share of the ways to it on which the ball is seen in time; NaN where nothing can come at all."""
+    """Share of the ways to it on which the ball is seen in time; NaN without a free way."""
     surface: float
-    """Share of its surface to whose points at least half of the ways are seen."""
+    """Share of its surface with at least half of the ways to each point seen in time."""
 
 
 @dataclass(frozen=True, eq=False)
 class Coverage:
-    """What a skin sees in time, by surface point."""
+    """Coverage of a skin by surface point."""
 
     free: FloatArray
     """(P,) weight of the ways to each point, in all postures."""
-    seen: FloatArray
+    visible: FloatArray
     """(P,) weight of those on which the ball is seen in time."""
     links: tuple[LinkShare, ...]
-    """Each link that something can come to, in the arm's order."""
+    """Links with a free way, in the arm's order."""
     arm: LinkShare
 
     @property
     def point_share(self) -> FloatArray:
-        """Share of the ways to each point that are seen (P,), NaN where nothing can come."""
-        return np.divide(self.seen, self.free, out=np.full(len(self.free), np.nan), where=self.free > 0)
+        """Share of the ways to each point seen in time (P,), NaN without a free way."""
+        return np.divide(self.visible, self.free, out=np.full(len(self.free), np.nan), where=self.free > 0)
 
 
 def covered(ways: Ways, sees: BoolArray) -> Coverage:
-    """Bring together, by point and by link, what each of B mounted units (B, S, W) sees in time."""
-    surface, seen = ways.surface, np.where(np.logical_or.reduce(sees), ways.weight, 0.0)
+    """Return the coverage by point and by link, from the ways that B mounted units (B, S, W) see in time."""
+    surface, visible = ways.surface, np.where(np.logical_or.reduce(sees), ways.weight, 0.0)
     count, names = len(surface.link), ways.model.links
-    free, seen = (
-        np.bincount(ways.point, weight.sum(axis=0), count).astype(np.float64) for weight in (ways.weight, seen)
+    free, visible = (
+        np.bincount(ways.point, weight.sum(axis=0), count).astype(np.float64) for weight in (ways.weight, visible)
     )
     reached = free > 0
 
     def shares(name: str, points: BoolArray) -> LinkShare:
-        f, s, area = free[points], seen[points], float(surface.area[points].sum())
+        f, s, area = free[points], visible[points], float(surface.area[points].sum())
         if not points.any():
             return LinkShare(name, 0.0, float("nan"), float("nan"))
-        # each point weighs as its area: points differ a little in what they stand for
+        # the weight of a point is its area: the areas differ slightly
         weight, good = surface.area[points] / area, s >= COVERED * f
         return LinkShare(name, area, float((weight * s).sum() / (weight * f).sum()), float((weight * good).sum()))
 
     links = (shares(names[i], (surface.link == i) & reached) for i in np.unique(surface.link[reached]))
-    return Coverage(free, seen, tuple(links), shares("whole arm", reached))
+    return Coverage(free, visible, tuple(links), shares("whole arm", reached))
 
 
 @dataclass(frozen=True)
-class Setting:
-    """What is looked at: the seed decides postures and ways."""
+class CoverageSetting:
+    """Setting of a measurement; the seed determines postures and ways."""
 
     model: RobotModel
     room: Fixtures
@@ -96,7 +96,7 @@ class Setting:
         return ways_to(self.model, self.room, self.params, q, point, rng)
 
     def met(self, sample: int = 0) -> Ways:
-        """Draw what stands in the arm's way, its hand on its path, either way along it, or in any direction."""
+        """Draw ways of the arm to objects at rest, its hand in either direction of its path, or in any direction."""
         rng = np.random.default_rng([self.seed, 52, sample])
         q, along = postures(self.model, self.room, self.workspace, self.postures, rng)
         to = rng.normal(size=(self.postures, 3))
@@ -111,8 +111,8 @@ def postures(
     """Draw postures of a workspace (S, n) [rad], and unit tangents of the hand's path there (S, 3), base frame.
 
     `circle` and `line` are the paper's paths, `paths` both, the hand upright; `joints` is the whole range of the
-    joints, where the arm is clear of itself and of the room, and has no path: None. Raises ExperimentError for anything
-    else, and where the arm cannot be.
+    joints, where the arm is free of collisions, without a path: None. Raises ExperimentError for any other workspace,
+    and for a path out of reach.
     """
     if count < 2:
         raise ExperimentError(f"The number of postures is {count}: give at least 2.")
@@ -129,12 +129,12 @@ def postures(
 
 
 def _anywhere(model: RobotModel, room: Fixtures, count: int, rng: np.random.Generator) -> FloatArray:
-    """Postures (S, n) in which the arm is clear of itself, and its moving part on the free side of all planes."""
+    """Return postures (S, n) without self-collision, with the moving part on the free side of all planes."""
     half, apart = np.minimum((model.q_max - model.q_min) / 2, np.pi), ever_apart(model)
     moving = np.isin(model.capsules.link, model.parts)
-    drawn = model.q_mid + half * rng.uniform(-1, 1, (_DRAWN * count, model.n))
+    samples = model.q_mid + half * rng.uniform(-1, 1, (_DRAWN * count, model.n))
     free = list[FloatArray]()
-    for q in drawn:
+    for q in samples:
         ends = capsule_ends(model, kinematics_of(model, q[None]))
         heights = ends[0, moving] @ room.planes[:, :3].T - room.planes[:, 3] - model.body.radius[:, None, None]
         if self_distances(model, ends)[0, apart].min(initial=np.inf) > 0 and heights.min(initial=np.inf) > 0:

@@ -1,4 +1,4 @@
-"""What comes at the arm, what the units can do, and how early is early enough."""
+"""Parameters of coverage: the approaching object, the units, and the time of a detection."""
 
 import math
 from dataclasses import dataclass, replace
@@ -11,7 +11,7 @@ from pretouch.sensing.sensor import PAPER_SENSOR, Sensor
 
 @dataclass(frozen=True)
 class CoverageParams(Checked):
-    """A ball comes straight at the arm, which moves towards it. Figures without a source are ours."""
+    """A ball and the arm that approach each other straight. Figures without a source are ours."""
 
     object_radius_m: Positive = 0.05
     """Radius of the ball [m]: a fist, as in the simulation."""
@@ -28,13 +28,13 @@ class CoverageParams(Checked):
     range_m: Positive = 1.3
     """Farthest target that fills the cone [m]: VL53L1X, short mode."""
     way_m: Positive = 0.8
-    """Length of the straight way that is looked at, and has to be free [m]: about a person's reach."""
+    """Length of the straight way, which has to be free [m]: about a person's reach."""
     reflectance: Fraction = 0.5
     """Diffuse reflectance at 940 nm: skin and light cloth reach 0.5 and more."""
     reflectance_limit: Positive = 0.17
-    """Reflectance of a target that fills the cone and is just seen at `range_m` (data sheet: grey)."""
+    """Reflectance of a target that fills the cone and is just visible at `range_m` (data sheet: grey)."""
     self_margin_m: NonNegative = 0.06
-    """What is seen from this much before the arm's or the room's own return on is taken for these [m]
+    """Distance before the return of the arm or the room from which a reading belongs to it [m]
     (`PerceptionParams.self_margin_m`)."""
 
     def __post_init__(self) -> None:
@@ -46,39 +46,39 @@ class CoverageParams(Checked):
             )
 
     def standing(self) -> "CoverageParams":
-        """Return the same for what stands in the arm's way, looked for on twice the way it takes to stop before it."""
+        """Return the same for objects at rest, with ways of twice the stopping distance."""
         still = replace(self, object_speed_m_s=0.0)
         return replace(still, way_m=max(2 * still.warning_m, (still.first + still.run) * GRID_M))
 
     @property
     def closing_m_s(self) -> float:
-        """Speed at which both come together [m/s]."""
+        """Closing speed of both [m/s]."""
         return self.object_speed_m_s + self.arm_speed_m_s
 
     @property
     def braking_m(self) -> float:
-        """Way that closes while the arm comes to rest [m]: v_a^2 / (2 a) of the arm, v_o v_a / a of the object."""
+        """Distance that closes while the arm comes to rest [m]: v_a^2 / (2 a) of the arm, v_o v_a / a of the object."""
         v_a, v_o = self.arm_speed_m_s, self.object_speed_m_s
         return v_a * (v_a / 2 + v_o) / self.deceleration_m_s2
 
     @property
     def reading_m(self) -> float:
-        """Way that closes in the period of a reading [m]."""
+        """Distance that closes in the period of a reading [m]."""
         return self.closing_m_s / self.rate_hz
 
     @property
     def last_reading_m(self) -> float:
-        """Way left at the last measurement that comes in time [m]."""
+        """Distance at the last measurement in time [m]."""
         return self.closing_m_s * self.latency_s + self.braking_m
 
     @property
     def warning_m(self) -> float:
-        """Way left at which a thing has to come into view [m], so that a reading surely comes in time."""
+        """Distance at which an object has to come into view for a reading in time [m]."""
         return self.last_reading_m + self.reading_m
 
     @property
     def light_m2(self) -> float:
-        """Square of the distance at which a ball that fills the cone is just seen [m^2]; a ball's mean slant is 2/3."""
+        """Square of the distance at which a ball that fills the cone is just visible [m^2]; its mean slant is 2/3."""
         return 2.0 / 3.0 * self.reflectance / self.reflectance_limit * self.range_m**2
 
     def seen_by(self, sensor: Sensor) -> tuple[float, float, int]:
@@ -89,17 +89,17 @@ class CoverageParams(Checked):
 
     @property
     def first(self) -> int:
-        """Number of the nearest place on a way's grid that counts."""
+        """Index of the nearest grid point of a way that counts."""
         return _steps(self.last_reading_m)
 
     @property
     def last(self) -> int:
-        """Number of the farthest place on it."""
+        """Index of the farthest grid point."""
         return int(self.way_m / GRID_M + 1e-9)
 
     @property
     def run(self) -> int:
-        """Steps of the grid that make a reading sure."""
+        """Steps of the grid within which there is a reading."""
         return _steps(self.reading_m)
 
 

@@ -1,8 +1,7 @@
-"""Whether units would see a ball that comes straight at the arm, and whether it has room to come.
+"""Visibility of a ball that approaches the arm straight, and the free space for it.
 
-A way is a straight line of the ball's centre: s metres before the contact it is at start + s u. It is looked at every
-`GRID_M`, at places that are the same at any speed, so that a faster ball never counts as seen where a slower one does
-not.
+A way is a straight line of the ball's centre: s metres before the contact it is at start + s u. It has grid points
+every `GRID_M`, the same at any speed, so that a faster ball never counts as seen where a slower one does not.
 """
 
 from typing import NamedTuple
@@ -16,10 +15,10 @@ from pretouch.sensing.sensor import Cones, Sensors
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 GRID_M = 0.01
-"""Distance between two places of a way that are looked at [m]."""
+"""Distance between two grid points of a way [m]."""
 
 _TOUCHING_M = 1e-6
-"""Depth to which rounding may put a ball into what it touches [m]."""
+"""Penetration of a touching ball by rounding, at most [m]."""
 
 
 class BallWays(NamedTuple):
@@ -28,18 +27,18 @@ class BallWays(NamedTuple):
     start: FloatArray
     """(W, 3) centre of the ball at the contact [m]."""
     way: FloatArray
-    """(W, 3) unit vectors u from there to where it comes from."""
+    """(W, 3) unit vectors u from there against the motion."""
     radius: float
-    """Of the ball [m]."""
+    """Radius of the ball [m]."""
 
 
 def ways_free(ways: BallWays, length: float, capsules: Capsules, planes: FloatArray) -> BoolArray:
-    """Whether (W,) a ball can come along each way of a length [m] without meeting anything before the contact.
+    """Return the ways (W,) of a length [m] on which a ball has no collision before the contact.
 
     Args:
-        ways: of the ball; the capsule that one begins at is not in its way.
+        ways: of the ball; the capsule at the contact does not count.
         length: of the ways [m].
-        capsules: C of arm and room, base frame, as all else.
+        capsules: C of arm and room, base frame, as all arguments.
         planes: (P, 4) rows (normal, offset), the normal pointing into free space.
     """
     ends = ways.start, ways.start + length * ways.way
@@ -49,31 +48,31 @@ def ways_free(ways: BallWays, length: float, capsules: Capsules, planes: FloatAr
 
 
 class View(NamedTuple):
-    """How far units see."""
+    """Ranges of units."""
 
     limit: FloatArray
-    """(K,) farthest reading that shows the ball, and not the arm or the room [m]."""
+    """(K,) farthest reading of the ball, nearer than the arm or the room [m]."""
     light: FloatArray
-    """(K,) of `in_view` [m^2]."""
+    """(K,) `light` of `in_view` [m^2]."""
     run: IntArray
     """(K,) steps of the grid for which the ball has to be in view."""
 
 
 @compiled
 def ways_seen(
-    ways: BallWays, free: BoolArray, first: int, last: int, sensors: Sensors, cones: Cones, view: View, seen: BoolArray
+    ways: BallWays, free: BoolArray, first: int, last: int, sensors: Sensors, cones: Cones, view: View, out: BoolArray
 ) -> None:
-    """Write whether (K, W) each unit has the ball in view at its `run` + 1 places of the grid in a row.
+    """Write whether (K, W) each unit sees the ball at `run` + 1 successive grid points.
 
     Args:
         ways: of the ball.
-        free: (W,) ways to look at; the others count as not seen.
-        first: number of the nearest place of the grid that counts, s = first GRID_M.
-        last: number of the farthest.
+        free: (W,) ways that count; the others are not visible.
+        first: index of the nearest grid point that counts, s = first GRID_M.
+        last: index of the farthest.
         sensors: K units.
-        cones: what each sees.
-        view: how far they see.
-        seen: (K, W) the answer.
+        cones: of the units.
+        view: ranges of the units.
+        out: (K, W) written.
     """
     start, way, radius = ways
     position, rotation = sensors.position, sensors.rotation
@@ -84,14 +83,14 @@ def ways_seen(
         widening, limit, light, run = cones.edge[cones.kind[k], 2], view.limit[k], view.light[k], view.run[k]
         reach = limit + radius
         for w in range(len(start)):
-            seen[k, w] = False
+            out[k, w] = False
             if not free[w]:
                 continue
             # from the unit the centre is at p + s u: |p + s u|^2 = p . p + s (2 p . u + s), depth linear in s
             x, y, z = start[w, 0] - ox, start[w, 1] - oy, start[w, 2] - oz
             ux, uy, uz = way[w, 0], way[w, 1], way[w, 2]
             along, offset2 = x * ux + y * uy + z * uz, x * x + y * y + z * z
-            # where it comes nearest within the stretch, at s = -p . u or an end, it must be in reach at all
+            # the nearest point of the stretch, at s = -p . u or an end, must be in reach
             closest = min(max(-along, near), far)
             if offset2 + closest * (2 * along + closest) > reach * reach:
                 continue
@@ -102,20 +101,20 @@ def ways_seen(
                 if in_view(depth + s * rise, offset2 + s * (2 * along + s), radius, widening, limit, light):
                     in_row += 1
                     if in_row > run:
-                        seen[k, w] = True
+                        out[k, w] = True
                         break
                 else:
                     in_row = 0
-                    if last - i <= run:  # too few places are left for `run` + 1 in a row
+                    if last - i <= run:  # too few grid points are left for `run` + 1 in a row
                         break
 
 
 @kernel
 def in_view(depth: float, distance2: float, radius: float, widening: float, limit: float, light: float) -> bool:
-    """Whether a unit sees a ball: enough of it in the cone, and nearer than `limit` [m].
+    """Return whether a unit sees a ball: enough of it in the cone, and nearer than `limit` [m].
 
     A reading comes from the ball's surface, on average 2/3 of the radius before its centre, d. With A the part of the
-    cone's cross-section that the ball fills, there is light enough where light A / d^2 >= 1.
+    cone's cross-section that the ball fills, the light suffices where light A / d^2 >= 1.
 
     Args:
         depth: of the ball's centre along the beam [m].
@@ -123,7 +122,7 @@ def in_view(depth: float, distance2: float, radius: float, widening: float, limi
         radius: of the ball [m].
         widening: tangent of half the cone's angle.
         limit: farthest reading that counts [m].
-        light: square of the distance at which something that fills the cone, as slanted as a ball, is just seen [m^2].
+        light: square of the distance at which a target that fills the cone, slanted as a ball, is just visible [m^2].
     """
     if distance2 <= radius * radius:  # the unit is inside the ball
         return True
@@ -131,7 +130,7 @@ def in_view(depth: float, distance2: float, radius: float, widening: float, limi
     read = np.sqrt(distance2) - 2.0 / 3.0 * radius
     if depth <= 0 or read > limit:
         return False
-    # the ball is taken for a disc across the beam at the depth of its centre: both circles lie in that plane
+    # the ball counts as a disc across the beam at the depth of its centre: both circles are in that plane
     cone, aside = depth * widening, np.sqrt(max(0.0, distance2 - depth * depth))
     if aside >= cone + radius:
         return False
@@ -141,7 +140,7 @@ def in_view(depth: float, distance2: float, radius: float, widening: float, limi
 
 @kernel
 def common_area(r: float, R: float, apart: float) -> float:
-    """Area [m^2] that two circles of radii r and R [m] share, whose centres are `apart` [m]."""
+    """Return the common area [m^2] of two circles of radii r and R [m] with centres `apart` [m]."""
     if apart >= r + R:
         return 0.0
     if apart <= abs(R - r):  # one lies inside the other

@@ -1,7 +1,7 @@
-"""Where more units help most: one after the other, each where it adds most to what is seen in time.
+"""Suggestion of more units: one after the other, each at the place that adds most to the coverage.
 
-What a set of units sees grows with each unit, and by less the more there are (it is submodular), so N units chosen this
-way see at least 1 - 1/e, 63 %, of what the best N of the same places could add (Nemhauser, Wolsey and Fisher 1978).
+The coverage of a set of units grows with each unit, by less the more there are (it is submodular). So N units chosen
+this way add at least 1 - 1/e, 63 %, of what the best N of the same places add (Nemhauser, Wolsey and Fisher 1978).
 """
 
 from collections.abc import Sequence
@@ -25,9 +25,9 @@ from pretouch.types import BoolArray, FloatArray
 HEIGHT_M = 0.008
 """Height of a range finder above the surface [m]."""
 _CLEAR_M = 0.4
-"""How far the beam of a place has to leave the arm and the room, in the ready posture [m]."""
+"""Least free length of a place's beam in the ready posture [m]."""
 _SPACING_M = 0.055
-"""Distance between places that are looked at [m]; a Panda has about 300."""
+"""Distance between candidate places [m]; a Panda has about 300."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class Suggestion:
 
     unit: SensorUnit
     gain: float
-    """By how much it raises the whole arm's share, after those before it, where it was chosen."""
+    """Increase of the whole arm's share, after the suggestions before it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,26 +45,28 @@ class Suggestions:
 
     chosen: tuple[Suggestion, ...]
     most: float
-    """No choice of as many of these places can raise the share by more: the lesser of (1) what the chosen ones add by
-    1 - 1/e, (2) what they add and the largest gains that are left."""
+    """Bound on the increase of the share by as many of these places: the smaller of (1) the increase by the chosen ones
+    over 1 - 1/e, (2) that increase and the largest gains that are left."""
     candidates: int
 
     @property
     def units(self) -> tuple[SensorUnit, ...]:
-        """The units alone."""
+        """Suggested units."""
         return tuple(one.unit for one in self.chosen)
 
 
 def candidates(ways: Ways, skin: Skin, sensor: Sensor = PAPER_SENSOR) -> tuple[SensorUnit, ...]:
-    """Units with a sensor all over the arm, looking outwards along the normal.
+    """Return units with a sensor all over the arm, with outward beams along the normal.
 
-    The beam of the paper's sensor leaves the arm there in the ready posture.
+    In the ready posture, the beam of the paper's sensor is free there.
     """
     model = ways.model
     kin = model.kinematics(model.description.q_ready)
     at = surface_of(model.body, model.moved_by, kin, _SPACING_M)
     places = zip(at.link.tolist(), at.point, at.normal, strict=True)
-    units = [SensorUnit(f"place {i}", model.links[link], _looking(*rest)) for i, (link, *rest) in enumerate(places)]
+    units = [
+        SensorUnit(f"place {i}", model.links[link], _outward_pose(*rest)) for i, (link, *rest) in enumerate(places)
+    ]
     units = [unit for unit in units if _fits(unit, model) and not _beside(unit, skin)]
     beams = Skin(units, model)
     of_no_link = placed_sensors(beams.arrays, kin)._replace(link=np.full(len(units), -1, np.int64))
@@ -73,7 +75,7 @@ def candidates(ways: Ways, skin: Skin, sensor: Sensor = PAPER_SENSOR) -> tuple[S
 
 
 def suggest(ways: Sequence[Ways], skin: Skin, count: int, places: tuple[SensorUnit, ...] | None = None) -> Suggestions:
-    """Choose places for `count` more units, by one or more sets of ways, each of which counts the same.
+    """Choose places for `count` more units, by one or more sets of ways with equal weights.
 
     Raises SkinError for more units than there are places.
     """
@@ -83,9 +85,9 @@ def suggest(ways: Sequence[Ways], skin: Skin, count: int, places: tuple[SensorUn
             f"{count} more units were requested, but {len(places)} positions were found: request 1 to {len(places)}."
         )
     weight = np.concatenate([some.share.ravel() for some in ways]) / len(ways)
-    by_skin = _seen(ways, skin).any(axis=0)
+    by_skin = _visible(ways, skin).any(axis=0)
     # each place alone: together they may be more zones than a skin has
-    by_place = np.concatenate([_seen(ways, Skin([place], ways[0].model)) for place in places])
+    by_place = np.concatenate([_visible(ways, Skin([place], ways[0].model)) for place in places])
     order, gains, left = greedy(by_place, np.where(by_skin, 0.0, weight), count)
     free = (name for number in count_from(1) if (name := f"suggested_{number}") not in skin.boards)
     chosen = tuple(Suggestion(replace(places[i], id=next(free)), gain) for i, gain in zip(order, gains, strict=True))
@@ -94,16 +96,16 @@ def suggest(ways: Sequence[Ways], skin: Skin, count: int, places: tuple[SensorUn
     return Suggestions(chosen, float(most), len(places))
 
 
-def _seen(ways: Sequence[Ways], skin: Skin) -> BoolArray:
-    """Whether (B, W) each mounted unit sees the ball of each way of all sets and postures."""
+def _visible(ways: Sequence[Ways], skin: Skin) -> BoolArray:
+    """Return whether (B, W) each mounted unit sees the ball of each way of all sets and postures."""
     return np.hstack([seen_by(some, skin).reshape(len(skin.first), some.weight.size) for some in ways])
 
 
 def greedy(sees: BoolArray, weight: FloatArray, count: int) -> tuple[list[int], list[float], float]:
-    """Choose `count` of C sets (C, W) of weighted elements (W,), each that which adds most to those before.
+    """Choose `count` of C sets (C, W) of weighted elements (W,), each time the set that adds most to those before.
 
     Returns:
-        Their indices, what each added, and a bound on what any other `count` could add to them. Sets that add nothing
+        Their indices, the gain of each, and a bound on the gain of any other `count` after them. Sets without a gain
         are not chosen.
     """
     rest, order, gains = weight.copy(), list[int](), list[float]()
@@ -117,8 +119,8 @@ def greedy(sees: BoolArray, weight: FloatArray, count: int) -> tuple[list[int], 
     return order, gains, float(np.sort(gain)[-count:].sum())
 
 
-def _looking(point: FloatArray, normal: FloatArray) -> FloatArray:
-    """Pose (4, 4) of a unit above a surface point (3,) [m], its beam along the normal (3,); rounded to 10 um."""
+def _outward_pose(point: FloatArray, normal: FloatArray) -> FloatArray:
+    """Return the pose (4, 4) of a unit above a surface point (3,) [m], its beam along the normal (3,); 10 um grid."""
     across, T = np.empty((2, 3)), np.eye(4)
     tangents_of(normal, across)
     T[:3, :3] = np.column_stack([across[0], across[1], normal])
@@ -135,7 +137,7 @@ def _fits(unit: SensorUnit, model: RobotModel) -> bool:
 
 
 def _beside(unit: SensorUnit, skin: Skin) -> bool:
-    """Whether another unit is where this one would be: a board has about 3 cm."""
+    """Return whether another unit is at the same place: a board has about 3 cm."""
     p = unit.T_link_sensor[:3, 3]
     return any(
         other.link == unit.link and np.linalg.norm(other.T_link_sensor[:3, 3] - p) < 0.03 for other in skin.units

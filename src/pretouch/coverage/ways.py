@@ -1,4 +1,4 @@
-"""Ways on which a ball and the arm come together, and which units see the ball in time."""
+"""Ways on which a ball and the arm approach each other, and their visibility to the units."""
 
 from dataclasses import dataclass
 
@@ -16,41 +16,41 @@ from pretouch.sensing.skin import Skin
 from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray
 
 _STILL = 1e-9
-"""Speed, for a hand at 1 m/s, below which a point of the arm counts as at rest."""
+"""Speed below which a point of the arm counts as at rest, for a hand at 1 m/s."""
 _STEP_S = 1e-6
-"""Time in which the way of such a point is its velocity [s]."""
+"""Time step of numerical velocities [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ways:
-    """S postures of an arm and W ways on which a ball comes to its surface in each, or the surface to a ball."""
+    """S postures of an arm, with W ways in each on which a ball approaches its surface, or the surface a ball."""
 
     model: RobotModel
     room: Fixtures
     params: CoverageParams
     surface: Surface
-    """P places."""
+    """P points."""
     postures: tuple[Kinematics, ...]
-    """S of them."""
+    """S postures."""
     point: IntArray
-    """(W,) index of the surface point that each way leads to, the same in all postures."""
+    """(W,) index of the surface point of each way, the same in all postures."""
     start: FloatArray
     """(S, W, 3) centre of the ball at the contact, base frame [m]."""
     way: FloatArray
-    """(S, W, 3) unit vectors from there to where it comes from."""
+    """(S, W, 3) unit vectors from there against the motion."""
     weight: FloatArray
-    """(S, W) how often it comes on each, for the same area; 0 where it cannot."""
+    """(S, W) relative frequency of each for the same area; 0 for a way that is not free."""
 
     @property
     def free(self) -> BoolArray:
-        """(S, W) whether it can come this way."""
+        """(S, W) flags of the free ways."""
         return self.weight > 0
 
     @property
     def share(self) -> FloatArray:
-        """(S, W) of all that comes, what comes on each way; they sum to 1, or to 0 where nothing can come."""
-        often = self.surface.area[self.point] * self.weight
-        return often / max(float(often.sum()), 1e-12)
+        """(S, W) share of each way in all approaches; the sum is 1, or 0 without a free way."""
+        frequency = self.surface.area[self.point] * self.weight
+        return frequency / max(float(frequency.sum()), 1e-12)
 
 
 def ways_to(
@@ -59,8 +59,8 @@ def ways_to(
 ) -> Ways:  # fmt: skip
     """Draw a way to each of some surface points (W,), in S postures q (S, n) [rad].
 
-    Directions are cosine-weighted about the outward normal: as things come that are equally likely everywhere and in
-    all directions. The points are indices of the arm's own surface, unless another one is given.
+    Directions are cosine-weighted about the outward normal, as for objects that are equally likely at all places and in
+    all directions. The points are indices of `surface`, by default the arm's own.
     """
     surface = model.surface if surface is None else surface
     postures = tuple(model.kinematics(row) for row in q)
@@ -69,10 +69,10 @@ def ways_to(
 
 
 def ways_met(model: RobotModel, room: Fixtures, params: CoverageParams, q: FloatArray, to: FloatArray) -> Ways:
-    """Return on which ways the arm itself runs into what stands about it, in S postures q (S, n) [rad].
+    """Return the ways of the moving arm to objects at rest, in S postures q (S, n) [rad].
 
     Its hand moves in the directions `to` (S, 3) and does not turn. A surface point of velocity v and outward normal n
-    meets what stands along v as often as v . n says, and nothing where that is negative.
+    collides along v with a frequency proportional to v . n, or never where that is negative.
     """
     surface, postures = model.surface, tuple(model.kinematics(row) for row in q)
     velocity = np.array([_velocities(model, *at) for at in zip(q, postures, to, strict=True)])
@@ -80,12 +80,12 @@ def ways_met(model: RobotModel, room: Fixtures, params: CoverageParams, q: Float
     normal = np.array([_normals(kin, surface) for kin in postures])
     onto = np.einsum("swi,swi->sw", velocity, normal)
     way = np.where(speed > _STILL, velocity / np.maximum(speed, _STILL), normal)
-    met = np.arange(len(surface.link)), way, np.where(onto > _STILL, onto, 0.0)
-    return _ways(model, room, params.standing(), surface, postures, met)
+    paths = np.arange(len(surface.link)), way, np.where(onto > _STILL, onto, 0.0)
+    return _ways(model, room, params.standing(), surface, postures, paths)
 
 
 def _velocities(model: RobotModel, q: FloatArray, kin: Kinematics, to: FloatArray) -> FloatArray:
-    """Velocities (P, 3) of the arm's surface with the hand at 1 m/s in a direction (3,), not turning."""
+    """Return velocities (P, 3) of the arm's surface, with the hand at 1 m/s in a direction (3,) and not turning."""
     J = model.ee_jacobian(kin)
     # damped as in `brought_to`
     qd = J.T @ np.linalg.solve(J @ J.T + 1e-4 * np.eye(6), np.concatenate([to, np.zeros(3)]))
@@ -95,21 +95,21 @@ def _velocities(model: RobotModel, q: FloatArray, kin: Kinematics, to: FloatArra
 
 
 def _in_base(kin: Kinematics, link: IntArray, point: FloatArray) -> FloatArray:
-    """Points (N, 3) of links (N,) in the base frame [m]."""
+    """Return points (N, 3) of links (N,) in the base frame [m]."""
     return kin.position[link] + np.einsum("nij,nj->ni", kin.rotation[link], point)
 
 
 def _normals(kin: Kinematics, surface: Surface) -> FloatArray:
-    """Outward normals (P, 3) in the base frame."""
+    """Return outward normals (P, 3) in the base frame."""
     return np.asarray(np.einsum("nij,nj->ni", kin.rotation[surface.link], surface.normal))
 
 
 def _ways(
     model: RobotModel, room: Fixtures, params: CoverageParams, surface: Surface, postures: tuple[Kinematics, ...],
-    drawn: tuple[IntArray, FloatArray, FloatArray],
+    paths: tuple[IntArray, FloatArray, FloatArray],
 ) -> Ways:  # fmt: skip
-    """Put the ball on ways drawn as point (W,), way (S, W, 3) and weight (S, W), which is 0 of those not free."""
-    point, way, weight = drawn
+    """Return the ways of the ball for points (W,), directions (S, W, 3) and weights (S, W); 0 for ways not free."""
+    point, way, weight = paths
     arm, about, r = model.capsules, room.capsules, params.object_radius_m
     centre = (surface.point + r * surface.normal)[point]
     start = np.array([_in_base(kin, surface.link[point], centre) for kin in postures])
@@ -121,23 +121,23 @@ def _ways(
 
 
 def cosine_weighted(normal: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Draw a unit vector (N, 3) about each of N unit vectors, with a density that goes with the cosine between them.
+    """Draw a unit vector (N, 3) about each of N unit vectors, with a density proportional to the cosine between them.
 
-    A unit vector and another one drawn evenly over the sphere have a sum of such a direction.
+    The sum of a unit vector and a random one, uniform on the sphere, has such a direction.
     """
-    drawn = rng.normal(size=normal.shape)
-    drawn = normal + drawn / np.linalg.norm(drawn, axis=1, keepdims=True)
-    return np.asarray(drawn / np.linalg.norm(drawn, axis=1, keepdims=True))
+    vector = rng.normal(size=normal.shape)
+    vector = normal + vector / np.linalg.norm(vector, axis=1, keepdims=True)
+    return np.asarray(vector / np.linalg.norm(vector, axis=1, keepdims=True))
 
 
 def seen_by(ways: Ways, skin: Skin) -> BoolArray:
-    """Whether (B, S, W) each of the B mounted units of a skin sees the ball of each way in time, in any of its zones.
+    """Return whether (B, S, W) each mounted unit of a skin sees the ball of each way in time, in any of its zones.
 
     A unit sees nothing behind the arm or the room in its own view, its own link included.
     """
     p = ways.params
     farthest, light, run = np.array([p.seen_by(unit.sensor) for unit in skin.units]).reshape(-1, 3).T.copy()
-    free, seen = ways.free, np.zeros((len(skin.first), len(ways.postures), len(ways.point)), np.bool_)
+    free, visible = ways.free, np.zeros((len(skin.first), len(ways.postures), len(ways.point)), np.bool_)
     for s, kin in enumerate(ways.postures):
         position, rotation, _ = placed_sensors(skin.arrays, kin)
         sensors = Sensors(position, rotation, np.full(len(skin), -1, np.int64))
@@ -146,5 +146,5 @@ def seen_by(ways: Ways, skin: Skin) -> BoolArray:
         by_zone = np.zeros((len(skin), len(ways.point)), np.bool_)
         ball = BallWays(ways.start[s], ways.way[s], p.object_radius_m)
         ways_seen(ball, free[s], p.first, p.last, sensors, skin.cones, view, by_zone)
-        seen[:, s] = np.logical_or.reduceat(by_zone, skin.first)
-    return seen
+        visible[:, s] = np.logical_or.reduceat(by_zone, skin.first)
+    return visible

@@ -117,7 +117,7 @@ def _decided(ticks: FloatArray, force: FloatArray, profile: Profile) -> Decision
     for time, sample in zip(ticks.tolist(), force, strict=True):
         force_now = None if np.isnan(sample[0]) else sample
         armed, window = window.full, add_force(window, force_now, p.window)
-        detection = thresholds.judged(window, force_now, armed, nowhere, nothing)
+        detection = thresholds.judge(window, force_now, armed, nowhere, nothing)
         events = {Event.WINDOW_FILLING: ""} if not detection.armed else {}
         if detection.contact is not None:
             events[Event.CONTACT] = ""
@@ -126,7 +126,7 @@ def _decided(ticks: FloatArray, force: FloatArray, profile: Profile) -> Decision
         before, mode = mode, next_mode(mode, events, resume=False)
         reacting = mode.mode is Mode.REACT
         contact = detection.contact if reacting and before.mode is not Mode.REACT else None
-        react = answer.begun(contact.force) if contact else react
+        react = answer.begin(contact.force) if contact else react
         react = react.advanced() if reacting else answer.init()
         compared = window.newest if force_now is not None and thresholds.compare == "filtered" else sample
         decisions.append((time, sample, compared, detection.thresholds, detection.armed, reacting, contact))

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pretouch.control.commander import asked_by
+from pretouch.control.commander import reference_of
 from pretouch.control.path import Path
 from pretouch.desired import Desired, DesiredKind
 from pretouch.profiles import Profile
@@ -83,7 +83,7 @@ def driven_motion(frame: Frame, world: World, kin: Kinematics) -> DrivenMotion |
     if desired is None:
         return None
     robot = replace(frame.inputs.robot, q_commanded=step.q_commanded)
-    request = asked_by(desired, step.stamp, kin, robot, model, kin.rotation[model.ee], world.profile.task, 1.0)
+    request = reference_of(desired, step.stamp, kin, robot, model, kin.rotation[model.ee], world.profile.task, 1.0)
     allowed = model.ee_jacobian(kin)[:3] @ step.command
     return DrivenMotion((request.velocity, allowed), _goal(desired, model))
 

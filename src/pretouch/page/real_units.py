@@ -22,7 +22,7 @@ class _Stamps(NamedTuple):
 
 
 class RealUnits:
-    """The port `Skin` of a simulated arm that carries real units.
+    """The port `SkinPort` of a simulated arm that carries real units.
 
     A reading that comes is as old in the simulation as it is in the room; from then on it ages with the simulation.
     """

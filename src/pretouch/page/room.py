@@ -10,7 +10,7 @@ from pretouch.control.path import Path, WayPoints
 from pretouch.errors import ParameterError
 from pretouch.page.real_units import RealUnits
 from pretouch.perception.closest import closest_points
-from pretouch.ports import Skin as UnitPort
+from pretouch.ports import SkinPort as UnitPort
 from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import brought_to

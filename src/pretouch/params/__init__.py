@@ -1,7 +1,7 @@
 """Every parameter of the controller: value, unit, meaning, source. Table I of the paper gives the defaults.
 
-Here are those of the paper: perception (eq. 1), task (2), nearness (3-7), thresholds (8-11), failures, reaction (12);
-ours stand in `params.pretouch`. A profile is a frozen set of them; `replace(profile, ...)` of the standard library
+This module has those of the paper: perception (eq. 1), task (2), nearness (3-7), thresholds (8-11), failures, reaction
+(12); ours are in `params.pretouch`. A profile is a frozen set of them; `replace(profile, ...)` of the standard library
 makes a variant, checked again.
 """
 
@@ -23,7 +23,7 @@ from pretouch.params.pretouch import TouchSensorParams as TouchSensorParams
 
 @dataclass(frozen=True)
 class ClosingSpeed(Checked):
-    """Estimate of the speed with which an object itself comes nearer."""
+    """Estimate of the speed at which an object itself approaches."""
 
     memory_s: Positive = 0.09
     """Time in which the weight of a reading falls by 1/e [s]: ours. A change of speed is followed to half in 0.14 s and
@@ -35,17 +35,15 @@ class OutsidePoints(Checked):
     """Obstacle points of outside sources, such as cameras."""
 
     per_link: PositiveCount = 2
-    """Points that are kept for each link that moves, in different directions from it."""
+    """Number of points for each moving link, in different directions from it."""
     margin_m: NonNegative = 0.05
-    """A point is taken as the arm or a fixture up to this from its surface, and its uncertainty [m]: 20 mm by which
-    links may differ from their capsules, 15 mm that posture and latency leave, 15 mm of edges: ours."""
+    """Distance from the arm or a fixture up to which a point belongs to it, plus its uncertainty [m]: 20 mm between
+    links and their capsules, 15 mm of posture and latency, 15 mm of edges: ours."""
     persistence_s: Positive = 0.15
-    """How long a point is kept after the measurement that showed it [s]: 60 ms of latency and two lost frames of a
-    camera at 30 Hz."""
+    """Life of a point after its measurement [s]: 60 ms of latency and two lost frames of a camera at 30 Hz."""
     hidden_s: NonNegative = 3.0
-    """How long a point is kept where the arm has come so near to it that it would be taken for the arm [s]: what a
-    source shows there says nothing. At 0.03 m/s, about a touch speed, it is the way through that margin. 0: as any
-    other point."""
+    """Life of a point so near to the arm that it would pass for the arm [s]: measurements there are ambiguous. At 0.03
+    m/s, about a touch speed, it is the time through that margin. 0: the life of any other point."""
     slow_after_s: Positive = 0.2
     """Age of a source's newest measurement at which the arm begins to slow [s]: `persistence_s`, and another frame."""
     silent_after_s: Positive = 0.4
@@ -61,36 +59,36 @@ class PerceptionParams(Checked):
     """From readings to obstacle points (eq. 1)."""
 
     persistence_s: Positive = 0.06
-    """How long a sensed point is kept after the measurement that showed it [s]: two missed readings at 50 Hz."""
+    """Life of a sensed point after its measurement [s]: two missed readings at 50 Hz."""
     self_margin_m: NonNegative | None = 0.06
-    """A reading is taken as the arm or a fixture, and left out, from this much before its predicted return [m]: twice
-    the VL53L1X ranging error of 25 mm, and 10 mm of pose error. None: all readings count as obstacles."""
+    """Distance before the predicted return of the arm or a fixture from which a reading is left out [m]: twice the
+    VL53L1X ranging error of 25 mm, and 10 mm of pose error. None: all readings count as obstacles."""
     self_aside_m: NonNegative = 0.0
-    """By how much the arm or a fixture may lie beside what a unit is believed to see, and be left out where a reading
-    is within that margin of it [m]. `pretouch` has 5 mm: one that a ruler placed saw the arm itself half the time."""
+    """Distance beside a unit's nominal cone at which the arm or a fixture still explains a reading within that margin
+    [m]. `pretouch` has 5 mm: a unit placed with a ruler saw the arm itself half the time."""
     spread_sigmas: NonNegative = 2.0
-    """Standard deviations of a unit's place by which what it shows counts as nearer, and as the arm or a fixture
-    earlier [1]: ours, about 95 % along one direction. It has no effect where the skin says no uncertainty."""
+    """Standard deviations of a unit's pose by which its obstacles count as nearer, and the margin of arm and fixtures
+    as larger [1]: ours, about 95 % along one direction. No effect for a skin without uncertainties."""
     slow_after_s: Positive = 0.1
-    """Age of a unit's newest telling reading at which the arm begins to slow [s]."""
+    """Age of a unit's newest informative reading at which the arm begins to slow [s]."""
     silent_after_s: Positive = 0.3
-    """Age of a unit's newest telling reading at which it counts as silent and the arm holds [s]."""
+    """Age of a unit's newest informative reading at which it counts as silent and the arm holds [s]."""
 
     reckon_below_minimum: bool = False
-    """Whether something nearer than a sensor measures (40 mm) stays where it was last seen, rather than at 40 mm."""
+    """True: an obstacle below a sensor's minimum distance (40 mm) stays at its last position, not at 40 mm."""
     place_at_stamp: bool = False
-    """Whether a reading is placed from where its unit was when it measured, by the joint velocities since, rather than
-    from where it is now: late readings of an arm that moves at 0.3 m/s are 15 mm off after 50 ms."""
+    """True: a reading is placed from the pose of its unit at the measurement, by the joint velocities since, not from
+    the present pose: after 50 ms, late readings of an arm at 0.3 m/s are 15 mm wrong."""
     keep_while_silent: bool = False
-    """Whether the point that a unit showed last is kept until it tells something else, or counts as silent: silence
-    is never free space. Off, it goes after `persistence_s`."""
+    """True: a unit's last point stays until its next informative reading, or until the unit counts as silent: silence
+    is never free space. False: it ends after `persistence_s`."""
     out_of_view_s: NonNegative = 0.0
-    """How long a point is kept from which the arm has carried its unit's beam away, so that no reading says it is gone
-    [s]: worth it with sensors with zones (docs/results/skins.md). 0: as any other point."""
+    """Life of a point that is out of its unit's beam by the motion of the arm, so that no reading can refute it [s]:
+    useful for sensors with zones (docs/results/skins.md). 0: the life of any other point."""
     closing: ClosingSpeed | None = None
-    """Whether the objects' own closing speeds are estimated, `Obstacles.closing_speed`."""
+    """Estimate of the objects' own closing speeds, `Obstacles.closing_speed`; none: no estimate."""
     outside: OutsidePoints | None = None
-    """Points of outside sources, such as cameras; none: they are not looked at."""
+    """Points of outside sources, such as cameras; none: they are ignored."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -117,16 +115,16 @@ class TaskParams(Checked):
     acceleration_m_s2: Positive = 1.0
     """Rate at which the speed along the path may grow [m/s^2]; slowing is not limited by it."""
     restore_cycles: PositiveCount = 200
-    """Control cycles l_max of eq. 4 until full speed is back after what slowed the arm is gone (Table I, 100 Hz)."""
+    """Control cycles l_max of eq. 4 until full speed after the cause of a reduction has gone (Table I, 100 Hz)."""
     position_gain_1_s: NonNegative = 2.0
     """Velocity towards the path per metre off it [1/s]."""
     off_path_m: Positive = 0.1
     """Distance from the path at which the arm no longer advances along it but only returns [m]."""
     orientation: Orientation = "hold"
-    """Whether the task is the hand's velocity alone, or also keeps its orientation at the start. The paper does not
-    say. Free, the hand rolls its units out of view of what restricts it (docs/reference/experiments.md)."""
+    """free: the task is the hand's velocity alone. hold: it also keeps the orientation at the start. The paper does not
+    specify this. A free hand rolls its units away from obstacles (docs/reference/experiments.md)."""
     orientation_gain_1_s: NonNegative = 1.0
-    """Angular velocity per radian of orientation error when it is held [1/s]."""
+    """Angular velocity per radian of orientation error with `hold` [1/s]."""
     damping_max: NonNegative = 0.1
     """Nakamura damping lambda_0, the factor mu of eq. 2 at a singularity (authors' code family)."""
     manipulability_threshold: Positive = 0.001
@@ -135,19 +133,19 @@ class TaskParams(Checked):
     """Weight k of the mid-joint term in eq. 2; larger values drag the arm off its path. It also keeps the
     Hessian positive definite."""
     mid_joint_projected: bool = False
-    """Whether the mid-joint term acts in the task's null space alone, where it drags nothing; the paper's acts on all
-    joint velocities."""
+    """True: the mid-joint term acts in the task's null space alone, where it does not disturb the task; the paper's
+    acts on all joint velocities."""
     mid_joint_time_s: Positive = 5.0
-    """Time t in which the mid-joint velocity would bring the joints to their middle [s]."""
+    """Time t in which the mid-joint velocity would move the joints to their middle [s]."""
     control_period_s: Annotated[float, Check(low=1e-4, high=1.0)] = 0.01
     """Period of the controller [s] (paper: 100 Hz)."""
     position_margin_rad: NonNegative = 0.01
-    """Distance the commanded joint positions keep from the joint limits [rad]."""
+    """Distance of the commanded joint positions from the joint limits, at least [rad]."""
 
 
 @dataclass(frozen=True)
 class SpeedReduction(Checked):
-    """Slowing the end-effector near obstacles (eq. 3). A unit that falls silent slows it with and without this."""
+    """Reduction of the end-effector's speed near obstacles (eq. 3). A silent unit slows it with and without this."""
 
     d_max_m: Positive = 0.8
     """Distance from the end-effector origin within which an obstacle slows the arm [m] (Table I)."""
@@ -158,7 +156,7 @@ RowKind = Literal["hard", "slack", "floor"]
 
 @dataclass(frozen=True)
 class RestrictionParams(Checked):
-    """Restricting the body's approach to obstacles (eqs. 5-7)."""
+    """Restriction of the body's approach to obstacles (eqs. 5-7)."""
 
     rows: RowKind = "slack"
     """hard: rows as written, no slack. slack: a weighted slack for each row. floor: as slack, with the limit never
@@ -189,38 +187,38 @@ class RestrictionParams(Checked):
 
 @dataclass(frozen=True)
 class WindowParams(Checked):
-    """The sliding window of the external force (eq. 8): it tells when the controller has seen enough to detect."""
+    """The sliding window of the external force (eq. 8): the detection begins once it is full."""
 
     samples: Annotated[int, Check(low=2)] = 100
-    """Samples in the sliding window at the control rate; the paper does not say, the authors' code has 500."""
+    """Samples in the sliding window at the control rate; not specified in the paper, 500 in the authors' code."""
     alpha: Fraction = 0.1
-    """Influence of an outlier on the value that enters the window, eq. 8 (Table I)."""
+    """Weight of an outlier in the value that enters the window, eq. 8 (Table I)."""
     lambda_: NonNegative = 0.75
     """Standard deviations beyond which a sample is an outlier, eq. 8 (Table I)."""
     freeze_while_reacting: bool = False
-    """Whether the window stands still during a reaction, so that the push does not become its mean and the release a
-    contact. Off in the paper; a rebound towards the person in 10 of 15 releases without it (prototype)."""
+    """True: the window does not change during a reaction, so that the push does not become its mean and the release a
+    contact. False in the paper; without it a rebound towards the person in 10 of 15 releases (prototype)."""
 
 
 @dataclass(frozen=True)
 class ThresholdParams(Checked):
-    """The contact thresholds, which move with the force's statistics and with what is near (eqs. 9-11)."""
+    """The contact thresholds, which move with the force's statistics and with obstacles (eqs. 9-11)."""
 
     f_base_n: Positive = 10.0
-    """Base force F_b above the mean that makes a contact, eq. 9 [N] (Table I)."""
+    """Base force F_b of a contact above the mean, eq. 9 [N] (Table I)."""
     f_std_n: NonNegative = 3.0
     """Largest addition F_std for a noisy signal, eq. 10 [N] (Table I)."""
     sigma_max_n: Positive = 3.0
-    """Standard deviation at which that addition is full, eq. 10 [N] (Table I)."""
+    """Standard deviation at which that addition is largest, eq. 10 [N] (Table I)."""
     f_d_n: NonNegative = 4.0
     """Largest reduction F_d near an obstacle, eq. 11 [N] (Table I)."""
     d_max_m: Positive = 0.8
     """Distance from the end-effector origin at which the reduction begins, eq. 11 [m] (Table I)."""
     d_min_m: NonNegative = 0.05
-    """Distance from the end-effector origin at which it is full, eq. 11 [m] (Table I)."""
+    """Distance from the end-effector origin at which it is largest, eq. 11 [m] (Table I)."""
     compare: Literal["filtered", "raw"] = "filtered"
-    """Which force is held against the thresholds: the newest value in the window (paper) or the raw sample
-    (the authors' code)."""
+    """Force that is compared with the thresholds: the newest value in the window (paper) or the raw sample (the
+    authors' code)."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -237,103 +235,102 @@ class ThresholdParams(Checked):
 
 @dataclass(frozen=True)
 class FailureParams(Checked):
-    """When to stop trusting the inputs."""
+    """Limits of plausible inputs."""
 
     state_timeout_s: Annotated[float, Check(low=0.0, high=1.0, open_low=True)] = 0.05
-    """Age of the robot state at which the arm holds [s]. As long are commands remembered."""
+    """Age of the robot state at which the arm holds [s]; commands are stored for the same time."""
     overrun_s: Positive = 0.05
-    """Time between two steps from which the later one brakes [s]: a command is meant to be held for one period."""
+    """Time between two steps from which the later one brakes [s]: a command is meant for one period."""
     force_max_n: Positive = 1e5
-    """Wrench component from which an estimate is no estimate [N, Nm]: far more than any arm survives. Let in, it would
-    spoil the window's sums."""
+    """Wrench component from which an estimate is implausible [N, Nm]: far more than any arm survives. It would spoil
+    the window's sums."""
     force_timeout_s: Positive = 0.2
     """Time without a force estimate after which the arm holds [s]."""
     desired_timeout_s: Positive = 0.1
-    """Time after the last instant of a desired motion from which the arm is brought to rest [s]: a few messages of a
-    commander at 50 Hz may be late or lost."""
+    """Time after the last instant of a desired motion at which the arm comes to rest [s]: a few messages of a commander
+    at 50 Hz may be late or lost."""
     solver_iterations: PositiveCount = 500
-    """Iterations of the QP solver after which the arm brakes. A bound on its time that is the same in each replay; most
-    steps need less than 10."""
+    """Iterations of the QP solver after which the arm brakes: a bound on its time that is the same in each replay. Most
+    steps need fewer than 10."""
 
 
 @dataclass(frozen=True)
 class ClampParams(Checked):
-    """Being caught between two objects while the arm yields, and how the arm opens."""
+    """Detection of a clamp between two objects while the arm yields, and the opening of the arm."""
 
     torque_nm: Positive = 4.0
-    """Torque against the direction of yielding from which the arm is caught between two objects [Nm]: four times the
+    """Torque against the direction of yielding from which there is a clamp between two objects [Nm]: four times the
     noise of a Panda's estimate, about 8 N on the hand."""
     open_m_s: Positive = 0.1
-    """Speed of the fastest point of the body while the arm opens along the path it came [m/s]."""
+    """Speed of the fastest point of the body while the arm opens back along its path [m/s]."""
     open_s: Positive = 0.5
-    """Longest that it opens [s]."""
+    """Longest time of the opening [s]."""
 
 
 @dataclass(frozen=True)
 class PinchParams(Checked):
-    """Something caught between two of the arm's links, or between one and a fixture: the arm opens and holds.
+    """Detection of a pinch between two links, or a link and a fixture: the arm opens and holds.
 
-    It needs the sequential detector; fixtures, localisation too.
+    It needs the sequential detector; with fixtures, localisation too.
     """
 
     gap_m: Positive = 0.2
-    """Gap in which something can be caught [m]: a thigh fits in no larger one."""
+    """Largest gap of a pinch [m]: that of a thigh."""
     force_n: Positive = 30.0
-    """Force from which something is caught [N]: a step of 2 Nm in one joint's estimate looks like 20 N with the lever
-    that forearm and upper arm have about the elbow. Less is a push, and opens the joint as well."""
+    """Force from which there is a pinch [N]: a step of 2 Nm in one joint's estimate looks like 20 N with the lever of
+    forearm and upper arm about the elbow. Less is a push, and opens the joint as well."""
 
 
 @dataclass(frozen=True)
 class GiveUpParams(Checked):
-    """Giving up where the arm meets the same object again and again."""
+    """Giving up after repeated contacts with the same object."""
 
     contacts: PositiveCount = 3
-    """Contacts at one place of the path after which it gives up."""
+    """Contacts at one location of the path after which the arm gives up."""
     push_j: Positive = 0.3
-    """Energy that a contact gives an arm that stands, from which it is a push and counts for no place [J]: boards met
-    at touch speed gave 0.05 J at most, at 0.3 m/s unbraked 0.5 J, pushes of 15 to 30 N for 0.3 s at least 0.59 J
-    (docs/explanation/reaction.md). To an arm that moves it may give twice its kinetic energy more."""
+    """Energy from a contact to an arm at rest above which it is a push and does not count [J]: boards gave 0.05 J at
+    most at touch speed, 0.5 J at 0.3 m/s unbraked, pushes of 15 to 30 N for 0.3 s at least 0.59 J
+    (docs/explanation/reaction.md). For a moving arm, twice its kinetic energy is added."""
     retry_s: Positive = 30.0
-    """Time after which it tries again if no unit saw anything there [s]."""
+    """Time after which the arm tries again if no unit saw an obstacle there [s]."""
 
 
 @dataclass(frozen=True)
 class AdmittanceParams(Checked):
-    """A virtual mass and damper in each joint that an external torque moves as long as it lasts."""
+    """A virtual mass and damper in each joint, driven by the external torque."""
 
     speed_max_m_s: Positive = 0.3
     """Bound on the speed of every point of the body's axes [m/s] (authors' code family, there of the hand)."""
     reach_m: Positive = 0.3
-    """How far a contact may move any point of the body's axes from where it was when the contact began [m]: as far as
-    the paper's reaction goes at most, so that the same room has to be free about the arm."""
+    """Largest displacement of any point of the body's axes by a contact [m]: that of the paper's reaction, so that the
+    same room has to be free about the arm."""
     inertia_kg_m2: Positive = 1.5
     """Virtual inertia of each joint [kg m^2]: with the damping, 0.1 s to come to rest."""
     damping_nm_s: Positive = 15.0
     """Virtual damping of each joint [Nm s/rad]: 15 N on the hand at 0.5 m from the axis give about 0.2 m/s."""
     lag_s: NonNegative = 0.0167
-    """Time constant of the robot's force estimate [s], 0 for none (a Panda's: about 10 Hz). Known, a force that has
+    """Time constant of the robot's force estimate [s], 0 for none (a Panda's: about 10 Hz). With it, a force that has
     ended no longer drives the arm while its estimate decays."""
     dead_band_nm: NonNegative = 0.5
-    """External torque of a joint that moves nothing [Nm]: friction of the smaller joints that the robot does not know.
-    """
+    """External torque of a joint that moves nothing [Nm]: friction of the smaller joints, unknown to the robot."""
     dead_band_fraction: NonNegative = 0.02
-    """What is added to it, as a fraction of the joint's torque limit: twice the noise of a Panda's larger joints."""
+    """Addition to it as a fraction of the joint's torque limit: twice the noise of a Panda's larger joints."""
     static_friction_nm: NonNegative = 0.0
-    """Filtered torque that tears a joint loose which stands [Nm], 0 for none (3 in `pretouch`): a bias of 2 Nm and
-    five deviations of a Panda's filtered noise. 15 N move the arm where they have a lever of 0.2 m."""
+    """Filtered torque above which a joint at rest begins to move [Nm], 0 for none (3 in `pretouch`): a bias of 2 Nm and
+    five deviations of a Panda's filtered noise. 15 N move the arm with a lever of 0.2 m."""
     start_energy_j: NonNegative = 0.2
-    """Kinetic energy of the virtual mass that a contact may begin with, before it has given any [J]."""
+    """Largest kinetic energy of the virtual mass at the beginning of a contact [J]."""
     quiet_s: Positive = 1.0
-    """Time without a push after which the arm goes on with its task [s]."""
+    """Time without a push after which the task continues [s]."""
     near_m: NonNegative = 0.1
-    """Distance from the body within which something seen makes the arm wait, as a hand that rests on it [m]."""
+    """Distance from the body within which an obstacle makes the arm wait, as a resting hand [m]."""
     patience_s: NonNegative = 10.0
-    """Longest that it waits for that [s]."""
+    """Longest wait for that [s]."""
     soft_hold: bool = False
-    """Whether an arm that holds yields to a push where the cause of the HOLD allows it (`modes.TABLE`)."""
+    """True: an arm in HOLD yields to a push where the cause of the HOLD allows it (`modes.TABLE`)."""
     clamp: ClampParams | None = None
-    """What tells that the arm is caught between two objects while it yields; None where it does not look for that."""
+    """Detection of a clamp between two objects while the arm yields; none: no detection."""
     pinch: PinchParams | None = None
-    """What tells something caught between links, or a link and a fixture, from a push; None where all is a push."""
+    """Detection of a pinch between links, or a link and a fixture; none: each contact is a push."""
     give_up: GiveUpParams | None = None
-    """When the arm gives up at a place; None where it never does."""
+    """Giving up after repeated contacts at a location; none: the arm never gives up."""

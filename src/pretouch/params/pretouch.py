@@ -12,147 +12,143 @@ from pretouch.errors import ParameterError
 
 @dataclass(frozen=True)
 class ProximityPriorParams(Checked):
-    """How something near raises the prior of a contact there, with a force away from it."""
+    """Increase of the prior of a contact by a near obstacle, with a force away from it."""
 
     gain: Annotated[float, Check(low=1.0, high=1e4)] = 100.0
-    """Times the prior is larger, at most, where something is about to touch [1]. It is never lowered: what no unit
-    sees keeps the prior it has without a skin."""
+    """Largest factor on the prior, for an obstacle about to touch [1]. The prior is never lowered: a contact that no
+    unit sees keeps the prior it has without a skin."""
     distance_m: Positive = 0.25
-    """Body distance from which the prior rises [m], less what is closed in `horizon_s`."""
+    """Body distance below which the prior rises [m], less the distance that closes in `horizon_s`."""
     horizon_s: Positive = 0.2
     """Time for which the closing speed counts [s]."""
 
 
 @dataclass(frozen=True)
 class TouchSensorParams(Checked):
-    """How a unit's touch sensor raises the prior of a contact on its link while it is touched.
+    """Increase of the prior of a contact on a link by a touched unit.
 
-    It does by so much that false touches at the rate below make the false alarms of the whole arm no more than twice as
-    many.
+    With it, false touches at the rate below at most double the false alarms of the whole arm.
     """
 
     false_touches_per_hour: Positive = 1.0
-    """How often a unit says that it is touched while it is not [1/h]: an assumption, on the cautious side. The fewer,
-    the more a touch counts."""
+    """Rate of a unit's false touches [1/h]: an assumption, on the cautious side. The lower it is, the more a touch
+    counts."""
     false_touch_s: Positive = 0.5
-    """How long it then says so [s]: an assumption."""
+    """Duration of a false touch [s]: an assumption."""
     fresh_s: Positive = 0.06
     """Age up to which a touch reading counts [s]: two missed ones at 50 Hz."""
     patience_s: Positive = 10.0
-    """Time for which a unit is believed to be touched [s]: from then on it is taken to be stuck."""
+    """Longest touch of a unit that counts [s]: after that it is assumed to be stuck."""
     forgiveness: Annotated[float, Check(low=0.001, high=1.0)] = 0.1
-    """Seconds of that time that a second untouched gives back [1]: in the long run a unit is believed to be touched
-    for at most about so large a part of the time."""
+    """Seconds of that time that an untouched second returns [1]: in the long run the touches of a unit count for at
+    most about this part of the time."""
 
 
 @dataclass(frozen=True)
 class MisfitParams(Checked):
-    """How the test covers what the model of free motion cannot express, and how its level follows what it measures.
+    """Adaptation of the test to errors of the model of free motion, and of its level to the measured evidence.
 
-    Measured on simulated arms as unkind as real ones (world `hard`, development seeds): docs/explanation/detection.md.
+    Measured on simulated arms with real faults (world `hard`, development seeds): docs/explanation/detection.md.
     """
 
     memory_s: Positive = 300.0
-    """Time over which the scatter of the windows' means is averaged [s]. Shorter, a push that grows slowly where no
-    unit sees it is learnt away: with 30 s one of six that grew by 1 N/s, with 300 s none."""
+    """Averaging time of the scatter of the windows' means [s]. A shorter one learns slow pushes that no unit sees as
+    free motion: with 30 s one of six that grew by 1 N/s, with 300 s none."""
 
 
 @dataclass(frozen=True)
 class SequentialParams(Checked):
-    """A test on the torques less their learnt mean in free motion."""
+    """Test of the torques less their learnt mean in free motion."""
 
     false_alarms_per_hour: Annotated[float, Check(low=1e-4, high=3600.0)] = 1.0
     """Bound on the rate of false alarms with nothing near [1/h], if free motion is as learnt."""
     slack_nats: NonNegative = 7.0
-    """How far below its bound ln R may be a contact [1], for Markov's inequality is not tight: as far as free motion
-    leaves it, or, without `misfit`, always. 18 simulated arms came to 4.4 in 1.5 h, where the bound is 12.8."""
+    """Largest reduction of the level of ln R below its bound [1], for Markov's inequality is not tight: as far as free
+    motion allows, or, without `misfit`, always. 18 simulated arms reached 4.4 in 1.5 h, with a bound of 12.8."""
     contact_gain: Positive = 15.0
-    """Times the spread of the torques is larger with a contact, in each direction it can push [1]: best for what is
-    just large enough to be found."""
+    """Ratio of the torques' spread with a contact to that without, in each direction of a push [1]: the best one for
+    just detectable forces."""
     tails: Annotated[float, Check(low=3.0, high=1000.0)] = 20.0
     """Degrees of freedom of the Student distribution of free motion: one outlier alone is no contact. In the world
     `hard` 30 gave twice as many false alarms, and 10 missed nine times as many contacts."""
     proximity: ProximityPriorParams | None = field(default_factory=ProximityPriorParams)
-    """How something near raises the prior of a contact there; None: not at all."""
+    """Increase of the prior of a contact by near obstacles; none: no increase."""
     learn: Literal["watched", "always", "never"] = "watched"
-    """When mean and spread of free motion are learnt. watched: while a skin watches; without one, the arm keeps what it
-    had learnt before. always: without a skin too. never: they stay as they began."""
+    """Learning of mean and spread of free motion. watched: while a skin watches; without a skin the model does not
+    change. always: without a skin too. never: the model stays at its start."""
     clear_m: Positive = 0.3
-    """Body distance within which nothing may be, for free motion to be learnt [m]."""
+    """Body distance without obstacles that the learning of free motion requires [m]."""
     suspect: Annotated[float, Check(low=0.05, high=1.0)] = 0.6
-    """Evidence from which a contact is suspected, so that nothing is learnt from before or after it [1]."""
+    """Evidence from which a contact is suspected, so that neighbouring samples are not learnt [1]."""
     relearn_after_s: NonNegative = 5.0
-    """Time after which a residual is learnt that looks like a contact and that all the while, with nothing near, the
-    same weight gripped or put down explains, or the same small torque on one joint [s]; 0: never. The arm waits so
-    long."""
+    """Time after which a residual that looks like a contact is learnt [s], if without obstacles the same change of a
+    load or the same small torque on one joint explains it all the time; 0: never. The arm waits for that time."""
     widen_at_turns: bool = True
-    """Whether it is learnt how much less of free motion is known where the arm accelerates hard, as where it turns
-    round."""
+    """True: the larger error of free motion at hard accelerations, as at reversals, is learnt."""
     memory_s: Positive = 10_000.0
-    """Time in which what was learnt of the mean fades towards not knowing [s]. One that forgets in 300 s follows what
-    sticks and who leans on the arm: in the world `hard` it gave three times as many false alarms."""
+    """Time in which the knowledge of the mean fades towards the prior [s]. With 300 s the mean follows friction and
+    people who lean on the arm: in the world `hard` that gave three times as many false alarms."""
     spread_memory_s: Positive = 30.0
-    """Time over which the spread is averaged [s]."""
+    """Averaging time of the spread [s]."""
     observer_gain_1_s: Positive = 60.0
-    """Gain of the robot's own observer [1/s]: how late its torques follow the motion."""
+    """Gain of the robot's own observer [1/s]: the delay of its torques."""
     offset_prior_nm: Positive = 0.7
-    """Standard deviation of a joint's constant offset before anything is learnt [Nm]."""
+    """Prior standard deviation of a joint's constant offset [Nm]."""
     friction_prior_nm: Positive = 1.0
-    """Standard deviation of the friction terms of a joint before anything is learnt [Nm]."""
+    """Prior standard deviation of the friction terms of a joint [Nm]."""
     mass_prior: Positive = 0.05
-    """Standard deviation of the relative error of each link's mass before anything is learnt [1]."""
+    """Prior standard deviation of the relative error of each link's mass [1]."""
     payload_prior_kg: Positive = 0.1
-    """Standard deviation of the unknown payload before anything is learnt [kg]."""
+    """Prior standard deviation of the unknown payload [kg]."""
     velocity_prior_rad_s2: Positive = 1.0
-    """Noise of the measured joint velocities, times the observer's gain, before anything is learnt [rad/s^2]: twice
-    that of 0.008 rad/s and 60 1/s, logged on a real Panda."""
+    """Prior noise of the measured joint velocities, times the observer's gain [rad/s^2]: twice that of 0.008 rad/s and
+    60 1/s, logged on a real Panda."""
     torque_prior_nm: Positive = 0.5
-    """What each joint's torque adds to that before anything is learnt [Nm]."""
+    """Prior further noise of each joint's torque [Nm]."""
     noise_floor_nm: Positive = 0.03
     """Smallest spread of a sample of a joint's torque [Nm]."""
     bias_floor_nm: Positive = 0.06
     """Smallest standard deviation of the error of the learnt mean [Nm]; 0.03 gave twice as many false alarms."""
     still_rad_s: Positive = 0.02
-    """Joint speed below which the arm counts as standing, with a spread of its own [rad/s]."""
+    """Joint speed below which the arm counts as at rest, with a spread of its own [rad/s]."""
     misfit: MisfitParams | None = field(default_factory=MisfitParams)
-    """How what the model cannot express is covered; none: not at all, and suspicious samples are not learnt."""
+    """Adaptation to errors of the model; none: no adaptation, and suspicious samples are not learnt."""
 
 
 @dataclass(frozen=True)
 class LocalisationParams(Checked):
-    """How the place of a contact is inferred from the torques it makes; `detect.localise` switches it on."""
+    """Localisation of a contact by its torques; `detect.localise` switches it on."""
 
     friction: Positive = 0.25
     """Standard deviation of the force in each direction across the surface, as a part of the force into it [1]: that of
     forces spread evenly over a cone of friction 0.5, about that of skin and cloth on smooth plastic (Derler and
     Gerhardt 2012)."""
     force_n: Positive = 40.0
-    """Standard deviation of the force into the surface before anything is measured [N]: a firm push by hand; harder
-    ones are believed all the same, for the torques then say far more."""
+    """Prior standard deviation of the force into the surface [N]: a firm push by hand; harder ones are inferred too,
+    for the torques then outweigh the prior."""
     relative: Fraction = 0.06
-    """Error of the torques as a part of them [1]: kinematics, friction that turns round under the push, motion within
-    the window."""
+    """Error of the torques as a part of them [1]: kinematics, reversal of friction by the push, motion within the
+    window."""
     tails: Annotated[float, Check(low=3.0, high=1000.0)] = 30.0
     """Degrees of freedom of the Student distribution of the error, as in the detector."""
     independent_s: Positive = 0.01
-    """Time after which the noise of a sample of the torques counts as new [s]: the best of 5, 10, 20 and 40 ms in
+    """Time after which the noise of a sample of the torques is independent [s]: the best of 5, 10, 20 and 40 ms in
     development trials; the robot's own observer, 60 1/s, forgets in 17 ms."""
     seen_share: Fraction = 0.7
-    """Part of the contacts that are by what the skin sees near, if it sees something: the share of the contacts of
-    development trials on the links 3 to 7 whose hand a skin of 32 units saw."""
+    """Part of the contacts at an obstacle that the skin sees, if it sees one: the share of the contacts of development
+    trials on the links 3 to 7 whose hand a skin of 32 units saw."""
     seen_m: Positive = 0.06
-    """How far from the touched place the point lies that a unit sees of what touches, standard deviation [m]: it is
-    seen from the side, 50 to 100 mm from the place in development trials with hands of 50 mm."""
+    """Standard deviation of the distance between the touched place and the point that a unit sees of the object [m]:
+    the view is from the side, 50 to 100 mm from the place in development trials with hands of 50 mm."""
     near_m: Positive = 0.25
-    """Body distance from which on something seen counts [m], as in the detector."""
+    """Body distance within which an obstacle counts [m], as in the detector."""
     unit_share: Fraction = 0.95
-    """Belief in units that say that they are touched [1]: a patch of 2 cm is 0.2 % of a Panda's surface and falsely
-    touched in 0.014 % of the time (`false_touches_per_hour`, `false_touch_s`), odds of about 14 to 1."""
+    """Probability that a reported touch is true [1]: a patch of 2 cm is 0.2 % of a Panda's surface and has false
+    touches in 0.014 % of the time (`false_touches_per_hour`, `false_touch_s`), odds of about 14 to 1."""
     unit_m: Positive = 0.015
-    """Least standard deviation of a place they give [m]: that of neighbouring places of the surface."""
+    """Least standard deviation of the place of a touched unit [m]: that of neighbouring places of the surface."""
     memory_s: NonNegative = 0.15
-    """Time over which what the windows of earlier steps said of each place is averaged [s]: an arm that moves shows
-    one contact from several postures."""
+    """Averaging time of the likelihoods of earlier steps [s]: a moving arm measures one contact in several postures."""
     update_s: Positive = 0.01
     """Least time from one inference to the next [s]."""
 
@@ -189,21 +185,20 @@ REGIONS: dict[BodyRegion, Region] = {
 
 @dataclass(frozen=True)
 class EffectiveMass(Checked):
-    """A touch speed that follows from the arm's mass along the normal and from what a body region bears."""
+    """A touch speed that follows from the arm's mass along the normal and from the force that a body region bears."""
 
     body_region: BodyRegion = "face"
-    """Which body region's figures the touch speed is for: by default that which gives the least speed, for a unit
-    cannot tell what it sees."""
+    """Body region of the touch speed: by default that of the least speed, for a unit cannot identify the object."""
     force_fraction: Fraction = 0.25
-    """Part of the allowed force that a touch may reach in the spring model: ours. Half is for what the arm pushes on
-    until it has detected the contact, and half of what is left for figures that public copies disagree on."""
+    """Part of the allowed force that a touch may reach in the spring model: ours. Half is a reserve for the push until
+    the detection of the contact, and half of the rest for figures on which public copies disagree."""
     rotor_inertia_kg_m2: NonNegative = 0.1
     """Inertia of each drive reflected to its joint, added to the arm's [kg m^2] (model data of this package)."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.force_fraction == 0:
-            raise ParameterError("EffectiveMass.force_fraction is 0, so nothing could be touched: give more.")
+            raise ParameterError("EffectiveMass.force_fraction is 0, so the touch speed would be 0: give more.")
 
     @property
     def allowed_force_n(self) -> float:
@@ -214,10 +209,10 @@ class EffectiveMass(Checked):
 
 @dataclass(frozen=True)
 class Tangential(Checked):
-    """Slowing a point near an object across the normal too."""
+    """Limit on the speed of a point near an object across the normal."""
 
     distance_m: Positive = 0.1
-    """Body distance below which it is slowed [m]."""
+    """Body distance below which the limit applies [m]."""
     speed_m_s: Positive = 0.1
     """Speed across the normal at the surface [m/s]; from there it grows linearly to the task's: ours."""
 
@@ -229,45 +224,45 @@ class BrakingParams(Checked):
     d_notice_m: Positive = 0.6
     """Body distance from which an approach is restricted [m] (Table I)."""
     deceleration_m_s2: Positive = 0.6
-    """Deceleration a of the braking curve [m/s^2]: that with which the curve binds the task's 0.3 m/s from about 0.1 m
-    on, Table I's d_crit. From 0.15 to 1 it changes the time to a touch by 0.6 s and its force by nothing
+    """Deceleration a of the braking curve [m/s^2]: with it the curve limits the task's 0.3 m/s from about 0.1 m on,
+    Table I's d_crit. From 0.15 to 1 it changes the time to a touch by 0.6 s and its force by nothing
     (docs/explanation/anticipation.md)."""
     latency_s: NonNegative = 0.06
-    """Time from a measurement to a motion tau [s]: a reading's period of 20 ms, a network delay of about 12 ms, a
+    """Latency tau from a measurement to a motion [s]: a reading's period of 20 ms, a network delay of about 12 ms, a
     control period, and the 16 ms of the drives' set-point filter."""
     margin_m: NonNegative = 0.01
-    """Taken off each body distance [m]: the ranging offset of a unit (at most 10 mm in the simulation; the data sheet
+    """Margin on each body distance [m]: the ranging offset of a unit (at most 10 mm in the simulation; the data sheet
     of the VL53L1X allows 20 to 25 mm of error in all)."""
     touch_speed_max_m_s: Positive = 0.05
-    """Largest touch speed v_c, whatever the body region allows [m/s]: ours; a light arm would otherwise touch faster
-    than it was tried. Force against it: docs/explanation/anticipation.md."""
+    """Largest touch speed v_c for any body region [m/s]: ours; a light arm would otherwise touch faster than in the
+    experiments. Force against it: docs/explanation/anticipation.md."""
     retreat_max_m_s: NonNegative = 0.1
-    """Fastest retreat that an object which comes nearer may ask for [m/s]: ours."""
+    """Fastest retreat from an approaching object [m/s]: ours."""
     tighten_m_s2: Positive = 3.0
-    """Rate at which a row may slow the arm [m/s^2]. A row appears at the speed the arm has: no step in the command."""
+    """Rate at which a row may slow the arm [m/s^2]. A row starts at the speed of the arm: no step in the command."""
     loosen_m_s2: Positive = 1.0
-    """Rate at which a row gives way, when its object is gone or not heard of too [m/s^2]: the task's acceleration."""
+    """Rate at which a row loosens, also without its object [m/s^2]: the task's acceleration."""
     slack_weight: Positive = 1000.0
     """Weight of a row's squared violation against the squared task error of eq. 2, both in (m/s)^2."""
     effective_mass: EffectiveMass | None = None
-    """Whether the touch speed follows from the arm's mass; none: it is `touch_speed_max_m_s`."""
+    """Touch speed by the arm's mass; none: it is `touch_speed_max_m_s`."""
     closing_deadband_m_s: NonNegative | None = None
-    """Closing speed of the object itself that is not counted [m/s]; more is taken off what an approach may be, which
-    needs `perception.closing`. 0.05 is what range noise of 20 mm leaves in the estimate for an object at rest.
-    None: the object's own speed does not count."""
+    """Closing speed of the object itself that does not count [m/s]; more of it lowers the approach limit, which needs
+    `perception.closing`. Range noise of 20 mm leaves 0.05 in the estimate for an object at rest. None: the object's own
+    speed does not count."""
     tangential: Tangential | None = None
-    """Whether a point near an object is slowed across the normal too."""
+    """Limit on the speed across the normal near an object; none: no limit."""
 
 
 @dataclass(frozen=True)
 class NullSpaceMotion(Checked):
-    """Links before the hand move away from what is near where that leaves the task as it is."""
+    """Motion of links before the hand away from obstacles, in the null space of the task."""
 
     distance_m: Positive = 0.25
-    """Body distance below which they do [m]."""
+    """Body distance below which they move away [m]."""
     speed_m_s: Positive = 0.1
-    """Speed of the closest point at no distance, growing with the square of what is missing of it [m/s]."""
+    """Speed of the closest point at a distance of 0; it falls with the square of the distance [m/s]."""
     joint_rad_s: Positive = 0.5
-    """Largest such joint velocity (norm) [rad/s]."""
+    """Largest norm of these joint velocities [rad/s]."""
     rate_rad_s2: Positive = 1.0
-    """Rate at which it changes [rad/s^2]."""
+    """Largest rate of their change [rad/s^2]."""

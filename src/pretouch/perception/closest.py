@@ -1,4 +1,4 @@
-"""The closest point of the body to each obstacle, on capsules: to points, and to fixtures that move beside the arm."""
+"""The closest body point to each obstacle, on capsules: to sensed points, and to moving fixtures beside the arm."""
 
 import numpy as np
 
@@ -23,16 +23,16 @@ def closest_points(
 ) -> Obstacles:
     """Find the closest body point of each obstacle.
 
-    The direction is taken from the capsule's axis to the obstacle, so it is defined in penetration, where the
-    distance is negative. On the axis the last direction holds.
+    The direction points from the capsule's axis to the obstacle, so it is defined in penetration, where the distance
+    is negative. On the axis the last direction stays.
 
     Args:
         kin: posture.
-        body: the C capsules that can be moved away, at least one.
+        body: the C capsules that joints move, at least one.
         ee_position: (3,) end-effector origin [m].
-        unit: (K,) index of the unit that showed each obstacle.
+        unit: (K,) index of each obstacle's unit.
         point: (K, 3) obstacles, base frame [m].
-        last_direction: (K, 3) unit vectors to fall back on.
+        last_direction: (K, 3) unit vectors for points on an axis.
     """
     near = no_obstacles(len(point))._replace(unit=unit, point=point, direction=last_direction.astype(np.float64))
     closest(placed(body, kin), near)
@@ -41,9 +41,9 @@ def closest_points(
 
 @compiled
 def closest(capsules: Capsules, obstacles: Obstacles) -> None:
-    """Write what of C placed capsules is closest to the points of obstacles, as `closest_points` says.
+    """Write the points of C placed capsules that are closest to the points of obstacles, see `closest_points`.
 
-    Where no direction is defined, the one that stands in the obstacles stays.
+    Where no direction is defined, that of the obstacles stays.
     """
     link, a, b, radius = capsules
     point, direction = obstacles.point, obstacles.direction
@@ -61,16 +61,16 @@ def closest(capsules: Capsules, obstacles: Obstacles) -> None:
 
 @kernel
 def _nearest_capsules(capsules: Capsules, point: FloatArray, distance: FloatArray) -> IntArray:
-    """Write how far points (K, 3) are from the nearest of C placed capsules, as `to_axis` has it; return which it is.
+    """Write the distances of points (K, 3) from the nearest of C placed capsules; return these capsules.
 
-    A tie goes to the lower index; a point that is NaN is nearest to the first.
+    A tie goes to the lower index; a point of NaN is nearest to the first.
     """
     count, (_, a, b, radius) = len(point), capsules
     at, least, nearest = np.empty((3, count)), np.empty(count), np.zeros(count, np.int64)
     for k in range(count):
         at[0, k], at[1, k], at[2, k] = point[k, 0], point[k, 1], point[k, 2]
-    # Capsule by capsule, all points: a loop without a branch, of which the processor does four turns at once. To look
-    # at each point's nearby capsules alone takes half as many roots, and twice as long.
+    # Capsule by capsule, all points: a loop without a branch, four iterations of which the processor runs at once. A
+    # search of each point's nearby capsules alone needs half as many roots, and takes twice as long.
     for c in range(len(radius)):
         ax, ay, az, thick = a[c, 0], a[c, 1], a[c, 2], radius[c]
         ux, uy, uz = b[c, 0] - ax, b[c, 1] - ay, b[c, 2] - az
@@ -92,9 +92,9 @@ def _nearest_capsules(capsules: Capsules, point: FloatArray, distance: FloatArra
 def beside(
     still: Capsules, moving: MovingFixtures, readings: RangeReadings, now: float, persistence: float
 ) -> Capsules:
-    """Return what stands and what moves, at the newest reading's stamp.
+    """Return the fixtures at rest and the moving ones, at the stamp of the newest reading.
 
-    No reading counts that is older than `persistence` [s] by `now` [s].
+    Readings older than `persistence` [s] at `now` [s] do not count.
     """
     stamps = readings.stamp[(readings.stamp <= now) & (readings.stamp >= now - persistence)]
     a, b = moving.at(float(stamps.max(initial=-np.inf)) if len(stamps) else moving.stamp)
@@ -104,14 +104,14 @@ def beside(
 
 
 def near_moving(moving: MovingFixtures, model: RobotModel, kin: Kinematics, now: float, first: int) -> Obstacles:
-    """Return where each link that moves is nearest to what moves beside it, one obstacle a link.
+    """Return the point of the moving fixtures that is nearest to each moving link, one obstacle a link.
 
     Args:
-        moving: with one capsule at least, as those that `sound_moving` returns.
+        moving: fixtures with at least one capsule, as `sound_moving` returns them.
         model: the arm.
         kin: its posture.
         now: instant of the step [s].
-        first: index that stands for the first link in `Obstacles.unit`; those of the others follow.
+        first: `Obstacles.unit` of the first link; the others follow.
     """
     (a, b), body, parts = moving.at(now), model.body, model.parts
     _, own_a, own_b, _ = placed(body, kin)
@@ -122,12 +122,10 @@ def near_moving(moving: MovingFixtures, model: RobotModel, kin: Kinematics, now:
     of_part = np.where((body.link == parts[:, None])[..., None], gap, np.inf).reshape(len(parts), -1)
     c, m = np.divmod(of_part.argmin(axis=1), len(moving.radius))
     # any direction will do where the axes meet
-    meets = (apart[c, m] <= _ON_AXIS)[:, None]
-    n = np.where(meets, (0.0, 0.0, 1.0), between[c, m] / np.where(meets, 1.0, apart[c, m][:, None]))
+    crossing = (apart[c, m] <= _ON_AXIS)[:, None]
+    n = np.where(crossing, (0.0, 0.0, 1.0), between[c, m] / np.where(crossing, 1.0, apart[c, m][:, None]))
     share = (along[c, m] / np.where(length[m] > 0.0, length[m], 1.0))[:, None]
     velocity = moving.a_velocity[m] + share * (moving.b_velocity[m] - moving.a_velocity[m])
-    return Obstacles(
-        unit=first + np.arange(len(parts)), point=on_other[c, m] - moving.radius[m, None] * n,
-        ee_distance=np.full(len(parts), np.inf), body_point=on_body[c, m] + body.radius[c, None] * n,
-        link=parts.copy(), direction=n, body_distance=gap[c, m], closing_speed=-(n * velocity).sum(axis=1),
-    )  # fmt: skip
+    unit, far, closing = first + np.arange(len(parts)), np.full(len(parts), np.inf), -(n * velocity).sum(axis=1)
+    point, body_point = on_other[c, m] - moving.radius[m, None] * n, on_body[c, m] + body.radius[c, None] * n
+    return Obstacles(unit, point, far, body_point, parts.copy(), n, gap[c, m], closing)

@@ -1,9 +1,9 @@
-"""Points of outside sources, such as cameras: which of them are obstacles, and how long they last.
+"""Points of outside sources, such as cameras: the choice of obstacles among them, and their life.
 
-Of any number of points at most `per_link` are kept for each link that moves: the one that is nearest to it by
-what is certain of their distance, then the nearest one in another direction, and so on. Each has a place of its own,
-so a place goes on showing the same side of the same link, as a unit of the skin does. What is on the arm or a fixture
-is left out, the arm being where it was when the points were measured.
+Of any number of points at most `per_link` stay for each moving link: the nearest one by its certain distance, then the
+nearest one in another direction, and so on. Each has a slot of its own, so a slot continues to show the same side of
+the same link, as a unit of the skin does. Points on the arm, in its posture at the measurement, and on fixtures are
+left out.
 """
 
 import math
@@ -22,54 +22,54 @@ from pretouch.robot.kinematics import Chain, Kinematics, dot, point_velocity
 from pretouch.types import FloatArray, IntArray, Obstacles, SeenPoints, no_obstacles
 
 FARTHEST = 100.0
-"""A coordinate [m] from here on is implausible: another unit, or a broken message."""
+"""A coordinate [m] of this size is implausible: another unit, or a broken message."""
 LARGEST_SIGMA = 1.0
 """A standard deviation [m] above this is implausible."""
 _ONE_INSTANT = 1e-3
-"""Stamps that differ by less [s] are taken as one: in that time no arm moves by more than 2 mm."""
+"""Stamps that differ by less [s] count as one: in that time no arm moves by more than 2 mm."""
 _APART = 0.5
-"""Points of one link are kept whose directions from it have at most this cosine: 60 degrees between them."""
+"""Largest cosine between the directions of the points of one link: at least 60 degrees between them."""
 _UNKNOWN, _OBSTACLE, _EXPLAINED, _HIDDEN = range(4)
 
 
 class OutsideState(NamedTuple):
-    """What outside sources showed last, in P places: so many for each link that moves, one link after the other."""
+    """Last points of outside sources in P slots: the same number for each moving link, one link after the other."""
 
     tracks: TrackState
-    """`used` is when a point was measured, `seen` when it was last there or hidden; all were heard with the sources."""
+    """`reading_stamp` is that of the measurement, `point_stamp` also that of a later set while the point is hidden."""
     sigma: Annotated[FloatArray, "P"]
     """(P,) standard deviation of each point [m]."""
-    heard: Cell
-    """Newest instant the sources were heard of [s]: -inf before the first, NaN where there was no source so far."""
+    source_stamp: Cell
+    """Stamp of the newest set [s]: -inf before the first, NaN without a source so far."""
 
 
-def outside_init(places: int, heard: float = math.nan) -> OutsideState:
-    """Return what is remembered before the first points."""
-    return OutsideState(track_init(places), np.zeros(places), np.full(1, heard))
+def outside_init(slots: int, source_stamp: float = math.nan) -> OutsideState:
+    """Return the state before the first points."""
+    return OutsideState(track_init(slots), np.zeros(slots), np.full(1, source_stamp))
 
 
-def outside_silence(heard: float, unfit: str, now: float, params: OutsidePoints | None) -> tuple[float, str]:
-    """Factor in [0, 1] on the speed for outside sources that fall silent, and what is wrong with them.
+def outside_silence(source_stamp: float, unfit: str, now: float, params: OutsidePoints | None) -> tuple[float, str]:
+    """Return the factor in [0, 1] on the speed for outside sources that fall silent, and their fault.
 
-    As with units, silence is no free space: from `slow_after_s` on the arm slows, at `silent_after_s` it stands, and at
-    once where `unfit` says what cannot be used of the points given. `heard` [s] is that of `OutsideState`.
+    As with units, silence is no free space: from `slow_after_s` on the arm slows, and at `silent_after_s` it stands. It
+    stands at once for a fault `unfit` of the points. `source_stamp` [s] is that of `OutsideState`.
     """
     if params is None:
         return 1.0, ""
     if unfit:
         return 0.0, unfit
-    if math.isnan(heard):  # where no source was ever heard of, none is missed
+    if math.isnan(source_stamp):  # there was no source so far
         return 1.0, ""
-    silence = now - heard
+    silence = now - source_stamp
     factor = speed_factor(silence, params.slow_after_s, params.silent_after_s)
     if silence < params.silent_after_s:
         return factor, ""
-    return 0.0, "has not been heard yet" if math.isinf(silence) else f"has been silent for {silence:.2f} s"
+    return 0.0, "has not reported yet" if math.isinf(silence) else f"has been silent for {silence:.2f} s"
 
 
 @compiled
 def usable(stamp: FloatArray, point: FloatArray, sigma: FloatArray) -> tuple[int, int]:
-    """How many of M points are plausible, and how many show nothing, for they hold a NaN."""
+    """Return the number of plausible points of M, and the number of rows without a point, with a NaN."""
     good = nothing = 0
     for m in range(len(stamp)):
         if np.isnan(point[m, 0]) or np.isnan(point[m, 1]) or np.isnan(point[m, 2]):
@@ -87,19 +87,19 @@ def _is_point(stamp: float, point: FloatArray, m: int, sigma: float) -> bool:
     return bool(0.0 <= sigma <= LARGEST_SIGMA and np.isfinite(stamp))
 
 
-class _Contenders(NamedTuple):
-    """M points that stand for election."""
+class _Candidates(NamedTuple):
+    """M points among which those of the slots are chosen."""
 
     near: Obstacles
-    """With the closest points of the body; the distance from it is less by the point's spread."""
+    """Points with their closest body points; the spread of a point shortens its distance from the body."""
     sigma: FloatArray
     """(M,) [m]."""
     stamp: FloatArray
-    """(M,) when each was measured [s]."""
+    """(M,) stamp of each measurement [s]."""
     status: IntArray
-    """(M,) what is known of each."""
+    """(M,) unknown, obstacle, explained by arm or fixture, or hidden by the arm."""
     first: IntArray
-    """(M,) the first of the places of its nearest link."""
+    """(M,) first slot of its nearest link."""
 
 
 @kernel
@@ -107,33 +107,33 @@ def take_points(
     sight: Sight, state: OutsideState, new: SeenPoints, posture: tuple[Kinematics, Chain],
     instants: tuple[float, float], fixtures: Capsules,
 ) -> None:  # fmt: skip
-    """Choose the points of each link's places, and change those that are kept.
+    """Choose the points of each link's slots.
 
-    Points that were kept before stand for election with the new ones where the arm hides them. A source gives the same
-    set until it has a newer one: each is taken in once. One that is newer than the step tells nothing, as with units.
+    Points that the arm hides now compete with the new ones. A source returns the same set until it has a newer one:
+    each set is used once. A set that is newer than the step is ignored, as with units.
 
     Args:
-        sight: what is looked at, and what is known to be there.
-        state: what was kept, changed.
+        sight: constants.
+        state: points so far, changed.
         new: points of the sources.
         posture: of the arm.
-        instants: that of the step and that of the posture [s].
+        instants: those of the step and of the posture [s].
         fixtures: placed.
     """
     (kin, chain), (now, posed), tracks = posture, instants, state.tracks
-    if np.isnan(state.heard[0]):
-        state.heard[0] = -np.inf
-    if not state.heard[0] < new.heard <= now:
+    if np.isnan(state.source_stamp[0]):
+        state.source_stamp[0] = -np.inf
+    if not state.source_stamp[0] < new.heard <= now:
         return
-    state.heard[0] = new.heard
-    # where the arm was when the points were measured: it may have moved by more than the margin since; the whole arm
-    # explains points, the base too, while only links that move have places for them
+    state.source_stamp[0] = new.heard
+    # the arm at the measurement of the points: it may have moved by more than the margin since; the whole arm explains
+    # points, the base too, while only moving links have slots
     here = placed(sight.arm, kin)
     arm = Capsules(here.link, np.empty_like(here.a), np.empty_like(here.b), here.radius)
     _move(here, chain, posed - new.heard, arm)
     candidates = _candidates(sight, state, new, now, placed(sight.body, kin), arm)
     chosen = np.full(len(state.sigma), -1, np.int64)
-    _elect(candidates, chosen, sight, (here, arm, fixtures), new.heard, chain, posed)
+    _choose(candidates, chosen, sight, (here, arm, fixtures), new.heard, chain, posed)
 
     points, stamps = np.zeros((len(chosen), 3)), np.full(len(chosen), new.heard)
     fresh = np.zeros(len(chosen), np.bool_)
@@ -145,11 +145,11 @@ def take_points(
     if sight.memory_s > 0.0:
         follow_points(tracks, points, stamps, fresh, sight.memory_s)
     for k in range(len(chosen)):
-        tracks.heard[k] = new.heard
+        tracks.report_stamp[k] = new.heard
         if chosen[k] >= 0:
-            tracks.point[k], state.sigma[k], tracks.used[k] = points[k], candidates.sigma[chosen[k]], stamps[k]
-            # a hidden point was not seen again: the arm is in front of it, so it is taken to be there still
-            tracks.seen[k] = stamps[k] if fresh[k] else new.heard
+            tracks.point[k], state.sigma[k], tracks.reading_stamp[k] = points[k], candidates.sigma[chosen[k]], stamps[k]
+            # the arm is in front of a hidden point, so the point counts as still there
+            tracks.point_stamp[k] = stamps[k] if fresh[k] else new.heard
             if sight.memory_s > 0.0 and not fresh[k]:
                 tracks.motion[0, k], tracks.motion[1, k] = points[k], 0.0
 
@@ -157,18 +157,18 @@ def take_points(
 @inlined
 def _candidates(
     sight: Sight, state: OutsideState, new: SeenPoints, now: float, body: Capsules, arm: Capsules
-) -> _Contenders:
-    """The kept points that the arm hides and the new ones that are young enough, each with its nearest link."""
+) -> _Candidates:
+    """Return the points that the arm hides and the new ones that are young enough, each with its nearest link."""
     p, sigmas, tracks = sight.outside, sight.perception.spread_sigmas, state.tracks
     room, count = len(new.stamp) + len(state.sigma), 0
     point, sigma, stamp, status = np.empty((room, 3)), np.empty(room), np.empty(room), np.full(room, _UNKNOWN)
     for k in range(len(state.sigma)):
         u = sigmas * state.sigma[k]
-        if now - tracks.used[k] > p.hidden_s or now - tracks.seen[k] > p.persistence_s:
+        if now - tracks.reading_stamp[k] > p.hidden_s or now - tracks.point_stamp[k] > p.persistence_s:
             continue
-        # within what the filter takes for the arm, no source can show the point; inside the arm it cannot be
+        # within the margin of the arm no source can show the point; inside the arm it cannot be
         if -u <= _gap(tracks.point, k, arm) <= p.margin_m + u:
-            point[count], sigma[count], stamp[count] = tracks.point[k], state.sigma[k], tracks.used[k]
+            point[count], sigma[count], stamp[count] = tracks.point[k], state.sigma[k], tracks.reading_stamp[k]
             status[count] = _HIDDEN
             count += 1
     for m in range(len(new.stamp)):
@@ -182,17 +182,17 @@ def _candidates(
     for m in range(count):
         near.body_distance[m] -= sigmas * sigma[m]
         first[m] = p.per_link * np.searchsorted(links, near.link[m])
-    return _Contenders(near, sigma, stamp, status, first)
+    return _Candidates(near, sigma, stamp, status, first)
 
 
 @inlined
-def _elect(
-    candidates: _Contenders, chosen: IntArray, sight: Sight, capsules: tuple[Capsules, Capsules, Capsules],
+def _choose(
+    candidates: _Candidates, chosen: IntArray, sight: Sight, capsules: tuple[Capsules, Capsules, Capsules],
     placed_for: float, chain: Chain, posed: float,
 ) -> None:  # fmt: skip
-    """Write the candidate of each place to `chosen`: of each link the nearest, then the nearest apart from it.
+    """Write the candidate of each slot to `chosen`: for each link the nearest, then the nearest apart from it.
 
-    A candidate is compared with arm and fixtures only once it would win: a cloud has hundreds that never do.
+    A candidate is compared with arm and fixtures only when it would win: a cloud has hundreds that never do.
     `capsules` are those of the arm now, of the arm at `placed_for`, which change with the stamp of the candidate, and
     of fixtures.
     """
@@ -224,7 +224,7 @@ def _elect(
 
 @kernel
 def _is_apart(direction: FloatArray, m: int, chosen: IntArray) -> bool:
-    """Whether point m lies in another direction from its link than all those chosen of it; not if one is missing."""
+    """Return whether point m has another direction from its link than all those chosen; false if one is missing."""
     for c in chosen:  # noqa: SIM110  compiled code knows no generators
         if c < 0 or c == m or dot(direction[c], direction[m]) > _APART:
             return False
@@ -233,7 +233,7 @@ def _is_apart(direction: FloatArray, m: int, chosen: IntArray) -> bool:
 
 @kernel
 def _gap(points: FloatArray, m: int, capsules: Capsules) -> float:
-    """Distance [m] of point m from the nearest of some placed capsules, negative inside."""
+    """Return the distance [m] of point m from the nearest placed capsule, negative inside."""
     least = np.inf
     for c in range(len(capsules.radius)):
         least = min(least, to_axis(points, m, capsules.a, capsules.b, c)[1] - capsules.radius[c])
@@ -242,7 +242,7 @@ def _gap(points: FloatArray, m: int, capsules: Capsules) -> float:
 
 @kernel
 def _move(capsules: Capsules, chain: Chain, age: float, moved: Capsules) -> None:
-    """Write to `moved` where placed capsules of the arm were `age` [s] before, to first order."""
+    """Write the placed capsules of the arm `age` [s] before to `moved`, to first order."""
     for c in range(len(capsules.link)):
         for end, out in ((capsules.a, moved.a), (capsules.b, moved.b)):
             x, y, z = point_velocity(chain, capsules.link[c], end[c, 0], end[c, 1], end[c, 2])
@@ -251,7 +251,7 @@ def _move(capsules: Capsules, chain: Chain, age: float, moved: Capsules) -> None
 
 @kernel
 def _on_planes(points: FloatArray, m: int, planes: FloatArray, within: float) -> bool:
-    """Whether point m is within a distance [m] of a plane, or behind it."""
+    """Return whether point m is within a distance [m] of a plane, or behind it."""
     for p in range(len(planes)):  # noqa: SIM110  compiled code knows no generators
         if dot(planes[p, :3], points[m]) - planes[p, 3] <= within:
             return True

@@ -1,4 +1,4 @@
-"""Where the sensed obstacles are: eq. 1, which readings count, and how long a point lasts, its spread, and silence."""
+"""Positions of sensed obstacles: eq. 1, the readings that count, the life and spread of a point, and silence."""
 
 import math
 from typing import Annotated, NamedTuple
@@ -15,44 +15,44 @@ from pretouch.types import BoolArray, FloatArray, IntArray, Number, Obstacles, R
 
 
 class Sight(NamedTuple):
-    """What is seen with, and what is known to be there."""
+    """Constants of perception: units, arm and fixtures."""
 
     sees: bool
-    """Whether there are units to see with."""
+    """True if there are units and the profile has perception."""
     filters: bool
-    """Whether readings are explained by what is known to be there."""
+    """True if readings of the arm and of fixtures are left out."""
     margin_m: float
-    """Distance before that from which on a reading is explained by it."""
+    """Distance before arm or fixture from which a reading belongs to it [m]."""
     memory_s: float
-    """Memory of the estimates of closing speeds, 0 where there are none."""
+    """Memory of the estimated closing speeds [s], 0 without estimates."""
     sigmas: float
-    """How many standard deviations of a unit's place are taken off, 0 where all places are exact."""
+    """Standard deviations of a unit's pose that shorten distances, 0 where all poses are exact."""
     arm: Capsules
     """All capsules of the arm."""
     body: Capsules
-    """Those that joints move."""
+    """Capsules that joints move."""
     planes: Annotated[FloatArray, "P", 4]
-    """(P, 4) of fixtures."""
+    """(P, 4) planes of fixtures."""
     skin: SkinArrays
     perception: PerceptionParams
     outside: OutsidePoints
 
 
 class TrackState(NamedTuple):
-    """The last point each of K units showed. NaN and -inf where there is none."""
+    """The last point of each of K units; NaN and -inf without one."""
 
     point: Annotated[FloatArray, "K", 3]
     """(K, 3) obstacle position, base frame [m]."""
     direction: Annotated[FloatArray, "K", 3]
     """(K, 3) last direction from the body to the point."""
-    seen: Annotated[FloatArray, "K"]
-    """(K,) instant of the measurement that showed the point [s]."""
-    used: Annotated[FloatArray, "K"]
-    """(K,) stamp of the newest reading taken into account [s]."""
-    heard: Annotated[FloatArray, "K"]
-    """(K,) stamp of the newest reading that reported anything [s]."""
+    point_stamp: Annotated[FloatArray, "K"]
+    """(K,) stamp of the measurement of the point [s]."""
+    reading_stamp: Annotated[FloatArray, "K"]
+    """(K,) stamp of the newest reading that was used [s]."""
+    report_stamp: Annotated[FloatArray, "K"]
+    """(K,) stamp of the newest reading with information, see `is_informative` [s]."""
     motion: Annotated[FloatArray, 2, "K", 3]
-    """(2, K, 3) smoothed place [m] and velocity [m/s] of each unit's point, where closing speeds are estimated."""
+    """(2, K, 3) smoothed position [m] and velocity [m/s] of each point, where closing speeds are estimated."""
 
 
 def track_init(units: int) -> TrackState:
@@ -62,7 +62,7 @@ def track_init(units: int) -> TrackState:
 
 
 def points_of_units(obstacles: Obstacles, units: int) -> FloatArray:
-    """Where each unit of a skin shows an obstacle (K, 3) [m], NaN where it shows none; other sources are not in it."""
+    """Return the obstacle point of each unit of a skin (K, 3) [m], NaN without one; other sources are left out."""
     points, own = np.full((units, 3), np.nan), obstacles.unit < units
     points[obstacles.unit[own]] = obstacles.point[own]
     return points
@@ -70,7 +70,7 @@ def points_of_units(obstacles: Obstacles, units: int) -> FloatArray:
 
 @compiled
 def placed_sensors(skin: SkinArrays, kin: Kinematics) -> Sensors:
-    """Return the sensors of a skin where they are in a posture: T_O_link @ T_link_sensor."""
+    """Return the poses of a skin's sensors in a posture: T_O_link @ T_link_sensor."""
     position, rotation = np.empty((len(skin.link), 3)), np.empty((len(skin.link), 3, 3))
     for k in range(len(skin.link)):
         m = skin.link[k]
@@ -103,82 +103,83 @@ def locate(position: FloatArray, rotation: FloatArray, distance: FloatArray) -> 
 
 
 # UM2356: 6 is a valid range whose wrap-around was not checked, 11 one of several pulses merged into one
-_SHOWN = tuple(int(s) for s in (RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED))
-# something is there, but the distance that comes with it is not used
+_TARGET = tuple(int(s) for s in (RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED))
+# a target is there, but its distance is not used
 _NEAR = (int(RangeStatus.MIN_RANGE), int(RangeStatus.MIN_CLIPPED))
 _NO_TARGET = tuple(
     int(s) for s in (RangeStatus.SIGNAL, RangeStatus.SIGMA, RangeStatus.OUT_OF_BOUNDS, RangeStatus.WRAPPED)
 )
-"""Statuses of a sensor at work that sees nothing near: too little light, too noisy, or beyond its range."""
+"""Statuses of a working sensor without a near target: too little light, too noisy, or beyond its range."""
 
 
 @compiled
 def measured(distance: FloatArray, status: IntArray, cones: Cones) -> FloatArray:
-    """Distance (K,) [m] each reading (K,) stands for, NaN where it shows no target.
+    """Return the distance (K,) [m] of each reading's target, NaN without a target.
 
-    A target nearer than the sensor can measure is taken to be at its minimum distance, never as gone. A number
-    beyond what it can measure shows nothing, whatever its status.
+    A target nearer than the sensor can measure counts as at the minimum distance, never as absent. A number beyond
+    the range of the sensor is no target, whatever its status.
     """
     target = np.full(len(distance), np.nan)
     for k in range(len(distance)):
         nearest, farthest = cones.range[cones.kind[k]]
         if status[k] in _NEAR:
             target[k] = nearest
-        elif status[k] in _SHOWN and 0 <= distance[k] <= farthest:  # false for NaN
+        elif status[k] in _TARGET and 0 <= distance[k] <= farthest:  # false for NaN
             target[k] = max(distance[k], nearest)
     return target
 
 
 @compiled
-def tells_anything(distance: FloatArray, status: IntArray, shown: FloatArray, cones: Cones) -> BoolArray:
-    """Say which readings (K,) tell anything: that a target is there, or that none near returns enough light.
+def is_informative(distance: FloatArray, status: IntArray, target: FloatArray, cones: Cones) -> BoolArray:
+    """Return which readings (K,) carry information: a target is there, or none near returns enough light.
 
-    A failure (hardware, synchronisation, cross-talk, no measurement yet, a distance that is negative or no number)
-    tells nothing, and is no more free space than silence is. A target beyond what the sensor can measure is far away.
-    `shown` is what `measured` makes of the readings.
+    A failure (hardware, synchronisation, cross-talk, no measurement yet, a distance that is negative or NaN) carries
+    none, and is no more free space than silence is. A target beyond the range of the sensor is far away. `target` is
+    the result of `measured`.
     """
-    tells = np.empty(len(status), np.bool_)
+    informative = np.empty(len(status), np.bool_)
     for k in range(len(status)):
-        # a number beyond the data sheet's range is no distance, but the sensor is at work; infinity and NaN are faults
+        # a number beyond the data sheet's range is no distance, but the sensor works; infinity and NaN are faults
         farthest = cones.range[cones.kind[k], 1]
-        far = status[k] in _SHOWN and np.isfinite(distance[k]) and distance[k] > farthest
-        tells[k] = not np.isnan(shown[k]) or far or status[k] in _NO_TARGET
-    return tells
+        far = status[k] in _TARGET and np.isfinite(distance[k]) and distance[k] > farthest
+        informative[k] = not np.isnan(target[k]) or far or status[k] in _NO_TARGET
+    return informative
 
 
 @kernel
-def take_in(
-    tracks: TrackState, stamp: FloatArray, points: FloatArray, fresh: BoolArray, shows: BoolArray, tells: BoolArray,
+def update_tracks(
+    tracks: TrackState, stamp: FloatArray, points: FloatArray, flags: tuple[BoolArray, BoolArray, BoolArray],
     now: float, persistence: float,
 ) -> None:  # fmt: skip
-    """Take readings (K,) of `stamp` [s] and points (K, 3) [m], those that are `fresh`, into the tracks.
+    """Update the tracks by readings (K,) of `stamp` [s] with points (K, 3) [m].
 
-    A reading that `shows` something replaces its unit's point. One that shows nothing, or comes too late, leaves the
-    point as it was, so one missed reading removes no obstacle. From the age `persistence` [s] on a point is given up.
-    One that `tells` anything is heard.
+    `flags` (K,) mark readings that are fresh, that show an obstacle, and that are informative. A fresh reading with an
+    obstacle replaces its unit's point. One without, or a late one, does not change the point, so a single missed
+    reading removes no obstacle. From the age `persistence` [s] on, a point is dropped.
     """
+    fresh, shows, informative = flags
     for k in range(len(stamp)):
         if fresh[k]:
-            # a failure is used up but not heard, so it ages the unit as silence does
-            tracks.used[k] = stamp[k]
-            if tells[k]:
-                tracks.heard[k] = stamp[k]
-            # a reading that is too old on arrival shows nothing: its point would be given up in this very step
+            # a failure is no report, so its unit ages as in silence
+            tracks.reading_stamp[k] = stamp[k]
+            if informative[k]:
+                tracks.report_stamp[k] = stamp[k]
+            # the point of a reading that is too old on arrival would be dropped in this very step
             if shows[k] and now - stamp[k] <= persistence:
-                tracks.seen[k] = stamp[k]
+                tracks.point_stamp[k] = stamp[k]
                 for i in range(3):
                     tracks.point[k, i] = points[k, i]
 
 
 @kernel
-def newer(used: FloatArray, stamp: FloatArray, now: float) -> BoolArray:
-    """Say which units (K,) have a reading newer than the last one used, and not from the future.
+def newer(last: FloatArray, stamp: FloatArray, now: float) -> BoolArray:
+    """Return which units (K,) have a reading newer than their last one, and not from the future.
 
-    A unit whose clock is ahead is so never heard: it must not pass for one that is well.
+    A unit whose clock is ahead so falls silent: it must not pass for one that works.
     """
     fresh = np.empty(len(stamp), np.bool_)
     for k in range(len(stamp)):
-        fresh[k] = used[k] < stamp[k] <= now  # false for NaN, and for -inf: never heard
+        fresh[k] = last[k] < stamp[k] <= now  # false for NaN, and for -inf, before the first reading
     return fresh
 
 
@@ -190,52 +191,54 @@ _FAILURES = {
 
 @compiled
 def speed_factor(silence: float, slow_after: float, silent_after: float) -> float:
-    """Factor in [0, 1] on the speed for who fell silent: 1 up to `slow_after` [s], 0 from `silent_after` [s] on.
+    """Return the factor in [0, 1] on the speed after a silence: 1 up to `slow_after` [s], 0 from `silent_after` [s] on.
 
-    Silence is never free space, and neither is a failure. The silence of who was never heard is infinite.
+    Silence is never free space, and neither is a failure. Before the first report the silence is infinite.
     """
     return 1.0 if silence <= slow_after else max(0.0, (silent_after - silence) / (silent_after - slow_after))
 
 
-def silent_units(skin: Skin, heard: FloatArray, status: IntArray, now: float, silent_after: float) -> str:
-    """Name the units that told nothing for `silent_after` [s]; of a unit with zones the unit is named, once.
+def silent_units(skin: Skin, report_stamp: FloatArray, status: IntArray, now: float, silent_after: float) -> str:
+    """Return the names of the units without a report for `silent_after` [s]; a unit with zones is named once.
 
-    `heard` (K,) [s] is when each told anything, `status` (K,) what it reported last.
+    `report_stamp` (K,) [s] is that of `TrackState`, `status` (K,) that of the last reading.
     """
-    silent = np.flatnonzero(now - heard >= silent_after).tolist()
+    silent = np.flatnonzero(now - report_stamp >= silent_after).tolist()
     return ", ".join(dict.fromkeys(skin.boards[k] + _FAILURES.get(int(status[k]), "") for k in silent))
 
 
 _ON_AXIS = math.cos(math.radians(0.5))
-"""A target may be anywhere in its cone, though eq. 1 puts it on the axis: it may leave the cone as soon as that is
-carried on. Half a degree is more than an arm at rest turns."""
+"""Eq. 1 puts a target on the axis, though it may be anywhere in the cone: it may leave the cone as soon as the unit
+moves. Half a degree is more than an arm at rest turns."""
 
 
 @kernel
 def looks_at(kin: Kinematics, skin: SkinArrays, k: int, point: FloatArray) -> bool:
-    """Whether the beam of unit k still goes to a point (3,)."""
+    """Return whether the beam of unit k still points to a point (3,)."""
     position, rotation, link = np.empty(3), np.empty((3, 3)), skin.link[k]
     pose_into(kin.position[link], kin.rotation[link], skin.T_link_sensor[k], position, rotation)
     return _on_axis(position, rotation, point) >= 0
 
 
 @kernel
-def give_up(tracks: TrackState, sensors: Sensors, tells: BoolArray, distance: FloatArray, until: float) -> None:
-    """Give up each point last seen before `until` [s] through whose place its unit now looks.
+def drop_refuted(
+    tracks: TrackState, sensors: Sensors, informative: BoolArray, distance: FloatArray, until: float
+) -> None:
+    """Drop each point from before `until` [s] whose unit now sees through its position.
 
-    `tells` (K,) are units with a new reading that tells something, `distance` (K,) [m] what they show, NaN for nothing.
+    `informative` (K,) marks units with a new informative reading of `distance` (K,) [m], NaN without a target.
     """
-    for k in range(len(tells)):
-        if tells[k] and tracks.seen[k] < until:
+    for k in range(len(informative)):
+        if informative[k] and tracks.point_stamp[k] < until:
             away = _on_axis(sensors.position[k], sensors.rotation[k], tracks.point[k])
-            # what is nearer may hide the point: such a reading says nothing about it
+            # a nearer target may hide the point: such a reading says nothing about it
             if away >= 0 and not distance[k] < away:
-                tracks.seen[k] = -np.inf
+                tracks.point_stamp[k] = -np.inf
 
 
 @kernel
 def _on_axis(position: FloatArray, rotation: FloatArray, point: FloatArray) -> float:
-    """Distance [m] of a point (3,) from a sensor on whose axis it lies, -1 if it does not, or is NaN."""
+    """Return the distance [m] of a point (3,) on a sensor's axis; -1 for a point off the axis, or NaN."""
     along, away2 = 0.0, 0.0
     for i in range(3):
         to = point[i] - position[i]
@@ -247,7 +250,7 @@ def _on_axis(position: FloatArray, rotation: FloatArray, point: FloatArray) -> f
 
 @kernel
 def spread(sigmas: float, position_sigma: Number, orientation_sigma: Number, distance: Number) -> Number:
-    """Spread u = n sqrt(sigma_p^2 + (d sigma_r)^2) [m]: how far a point may lie from where eq. 1 puts it.
+    """Return the spread u = n sqrt(sigma_p^2 + (d sigma_r)^2) [m]: the possible distance of a point from eq. 1's.
 
     `sigmas` n counts standard deviations, those of the unit's position [m] and orientation [rad] in the worst
     direction; `distance` d [m] is from the unit to the point.
@@ -258,19 +261,19 @@ def spread(sigmas: float, position_sigma: Number, orientation_sigma: Number, dis
 
 @kernel
 def widen(ends: FloatArray, sigmas: float, skin: SkinArrays, distance: FloatArray, most: float) -> None:
-    """Add to `ends` (K,) [m], up to which the arm and fixtures explain a reading, its spread, but no more than `most`.
+    """Add its spread, at most `most`, to the `ends` (K,) [m] up to which arm and fixtures explain a reading.
 
-    `distance` (K,) [m] is what each reading stands for.
+    `distance` (K,) [m] is that of each reading's target.
     """
     for k in range(len(ends)):
-        # an obstacle so close before the arm is not seen: `most` bounds how much a badly placed unit may hide
+        # an obstacle so close to the arm is left out: `most` bounds the distance for a badly placed unit
         ends[k] += min(spread(sigmas, skin.position_sigma[k], skin.orientation_sigma[k], distance[k]), most)
 
 
 @kernel
 def spread_of(point: FloatArray, k: int, sigmas: float, skin: SkinArrays, kin: Kinematics) -> float:
-    """Spread [m] of a point (3,) of unit k, as far as the unit now is from it."""
-    # from the unit as it is now, not as it measured: at 5 degrees u is off by 3 mm at most, without a memory of it
+    """Return the spread [m] of a point (3,) of unit k at its present distance from the unit."""
+    # with the present pose of the unit, not that of the measurement: at 5 degrees u is wrong by 3 mm at most
     origin, R, away2 = kin.position[skin.link[k]], kin.rotation[skin.link[k]], 0.0
     for i in range(3):
         at = origin[i]
@@ -283,10 +286,10 @@ def spread_of(point: FloatArray, k: int, sigmas: float, skin: SkinArrays, kin: K
 
 @kernel
 def bring_nearer(obstacles: Obstacles, m: int, u: float) -> None:
-    """Take its spread u [m] off the distances of obstacle m; direction and body point stay those of its point.
+    """Subtract a spread u [m] from the distances of obstacle m; direction and body point do not change.
 
-    The distance from the body may become negative (eqs. 5-7), that from the end-effector is at least 0: eq. 3 makes a
-    factor on the speed of it.
+    The distance from the body may become negative (eqs. 5-7), that from the end-effector is at least 0: eq. 3 turns it
+    into a factor on the speed.
     """
     obstacles.body_distance[m] -= u
     obstacles.ee_distance[m] = max(0.0, obstacles.ee_distance[m] - u)

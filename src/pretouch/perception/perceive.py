@@ -12,15 +12,15 @@ from pretouch.perception.obstacles import (
     Sight,
     TrackState,
     bring_nearer,
-    give_up,
+    drop_refuted,
+    is_informative,
     locate,
     looks_at,
     measured,
     newer,
     pose_into,
     spread_of,
-    take_in,
-    tells_anything,
+    update_tracks,
     widen,
 )
 from pretouch.perception.scene_filter import leave_out, plane_return
@@ -32,70 +32,71 @@ from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles, some_of
 
 
 class Readings(NamedTuple):
-    """As `RangeReadings`."""
+    """`RangeReadings` as a record."""
 
     stamp: Annotated[FloatArray, "K"]
     distance: Annotated[FloatArray, "K"]
     status: Annotated[IntArray, "K"]
 
 
-class Seen(NamedTuple):
-    """What units and others see, and how well they are heard."""
+class PerceivedScene(NamedTuple):
+    """Obstacles near the arm, and the silence of their sources."""
 
     distance: Annotated[FloatArray, "K"]
-    """(K,) what each reading stands for [m]; NaN where it shows no target."""
+    """(K,) distance of each reading's target [m], NaN without a target."""
     near: Obstacles
-    found: IntCell
-    """Obstacles that units and outside points show."""
-    all: IntCell
-    """With the nearest of moving fixtures, behind them."""
+    sensed: IntCell
+    """Number of obstacles of units and outside points."""
+    total: IntCell
+    """Number with the nearest points of moving fixtures, which come last."""
     nearest: Cell
     """Distance of the nearest obstacle from the end-effector origin [m]."""
-    heard: Cell
+    silence_scale: Cell
     """Factor on the speed for units and outside sources that fall silent."""
 
 
 @kernel
 def perceive(
-    sight: Sight, memory: tuple[TrackState, OutsideState], readings: Readings, seen: Seen,
+    sight: Sight, memory: tuple[TrackState, OutsideState], readings: Readings, scene: PerceivedScene,
     posture: tuple[Kinematics, Chain, FloatArray], instants: tuple[float, float], beside: Capsules,
 ) -> tuple[int, float, float]:  # fmt: skip
-    """Locate what the units see (eq. 1), leave out the arm and fixtures, and find the closest body points.
+    """Locate obstacles (eq. 1), leave out the arm and fixtures, and compute the closest body points.
 
-    Changes the tracks, writes obstacles, those of outside points last, and what each reading stands for, (K,) [m], NaN
-    for no target. Where the place of a unit or of a point is uncertain, distances are less by the points' spread, and
-    the arm and fixtures are expected earlier by it.
+    Updates the tracks; writes the obstacles, those of outside points last, and the distance of each reading's target
+    (K,) [m], NaN without one. An uncertain pose of a unit, or an uncertain point, shortens the distances by the spread
+    of the points, and lengthens the range in which arm and fixtures explain a reading.
 
-    `posture` has the end-effector origin (3,) [m] too; `instants` are that of the step and that of the posture [s].
-    Returns how many obstacles there are, the distance of the nearest from the end-effector, and when the unit that is
-    silent for longest last reported anything.
+    `posture` includes the end-effector origin (3,) [m]; `instants` are those of the step and of the posture [s].
+    Returns the number of obstacles, the distance of the nearest from the end-effector, and the last report of the unit
+    that is silent for longest [s].
     """
-    skin, p, room, distance = sight.skin, sight.perception, seen.near, seen.distance
+    skin, p, room, distance = sight.skin, sight.perception, scene.near, scene.distance
     (tracks, outside), (kin, _, ee), now = memory, posture, instants[0]
     distance[:] = measured(readings.distance, readings.status, skin.cones)
 
-    # which readings are new, show what is not known to be there, and where
-    fresh, any_fresh = newer(tracks.used, readings.stamp, now), False
+    # new readings: those of obstacles, and their points
+    fresh, any_fresh = newer(tracks.reading_stamp, readings.stamp, now), False
     for k in range(len(fresh)):
         any_fresh = any_fresh or fresh[k]
-    # casting cones is what a new reading costs: a step without one leaves it out
+    # a new reading costs the casting of cones: a step without one skips it
     if any_fresh:
-        _take_readings(sight, tracks, readings, seen, fresh, posture, instants, beside)
+        _take_readings(sight, tracks, readings, scene, fresh, posture, instants, beside)
 
-    keeps = _lasting(tracks, p.persistence_s, p.silent_after_s if p.keep_while_silent else 0.0)
-    for k in range(len(keeps)):
-        if p.out_of_view_s > keeps[k] and not looks_at(kin, skin, k, tracks.point[k]):
-            keeps[k] = p.out_of_view_s
+    lives = _lives(tracks, p.persistence_s, p.silent_after_s if p.keep_while_silent else 0.0)
+    for k in range(len(lives)):
+        if p.out_of_view_s > lives[k] and not looks_at(kin, skin, k, tracks.point[k]):
+            lives[k] = p.out_of_view_s
     body, estimates = placed(sight.body, kin), sight.memory_s > 0.0
-    units = _show(tracks, keeps, now, body, ee, estimates, room)
+    units = _write_obstacles(tracks, lives, now, (body, ee), estimates, room)
     for m in range(units):
         if sight.sigmas > 0:
             bring_nearer(room, m, spread_of(room.point[m], room.unit[m], sight.sigmas, skin, kin))
     count = units
-    if outside.heard[0] > -np.inf:  # false where there was no source
+    if outside.source_stamp[0] > -np.inf:  # false where there was no source
         o = sight.outside
-        keeps = _lasting(outside.tracks, o.persistence_s, o.silent_after_s if p.keep_while_silent else 0.0)
-        count += _show(outside.tracks, keeps, now, body, ee, estimates, some_of(room, units, len(room.unit)))
+        lives = _lives(outside.tracks, o.persistence_s, o.silent_after_s if p.keep_while_silent else 0.0)
+        rest = some_of(room, units, len(room.unit))
+        count += _write_obstacles(outside.tracks, lives, now, (body, ee), estimates, rest)
         for m in range(units, count):
             bring_nearer(room, m, p.spread_sigmas * outside.sigma[room.unit[m]])
             room.unit[m] += len(distance)
@@ -103,37 +104,42 @@ def perceive(
     for m in range(count):
         nearest = min(nearest, room.ee_distance[m])
     for k in range(len(distance)):
-        oldest = min(oldest, tracks.heard[k])
+        oldest = min(oldest, tracks.report_stamp[k])
     return count, nearest, oldest
 
 
 @kernel
-def _lasting(tracks: TrackState, persistence: float, silence: float) -> FloatArray:
-    """For how long each point is kept (K,) [s]."""
-    keeps = np.full(len(tracks.seen), persistence)
-    for k in range(len(keeps)):
-        # nothing was heard since the point was seen: silence is no free space, and keeps it longer
-        if tracks.heard[k] <= tracks.seen[k]:
-            keeps[k] = max(persistence, silence)
-    return keeps
+def _lives(tracks: TrackState, persistence: float, silence: float) -> FloatArray:
+    """Return the time for which each point stays (K,) [s]."""
+    lives = np.full(len(tracks.point_stamp), persistence)
+    for k in range(len(lives)):
+        # no report since the point: silence is no free space, so the point stays longer
+        if tracks.report_stamp[k] <= tracks.point_stamp[k]:
+            lives[k] = max(persistence, silence)
+    return lives
 
 
 @kernel
-def _show(
-    tracks: TrackState, keeps: FloatArray, now: float, body: Capsules, ee: FloatArray, estimates: bool,
+def _write_obstacles(
+    tracks: TrackState,
+    lives: FloatArray,
+    now: float,
+    arm: tuple[Capsules, FloatArray],
+    estimates: bool,
     room: Obstacles,
-) -> int:  # fmt: skip
-    """Write the obstacles whose points last, and the placed body's closest points to them; return how many.
+) -> int:
+    """Write the obstacles of current points, and the closest points of the placed body; return their number.
 
-    The tracks keep the directions. `keeps` (K,) [s] is for how long each lasts, `ee` (3,) the end-effector origin [m].
+    The tracks store the directions. `lives` (K,) [s] is the time for which each point stays; `arm` is the body and the
+    end-effector origin (3,) [m].
     """
-    count = 0
-    for k in range(len(keeps)):
-        if now - tracks.seen[k] <= keeps[k]:
+    count, (body, ee) = 0, arm
+    for k in range(len(lives)):
+        if now - tracks.point_stamp[k] <= lives[k]:
             room.unit[count] = k
             for i in range(3):
                 room.point[count, i], room.direction[count, i] = tracks.point[k, i], tracks.direction[k, i]
-            if np.isnan(tracks.direction[k, 0]):  # of outside points: it stays only for one on a capsule's axis
+            if np.isnan(tracks.direction[k, 0]):  # an outside point; it matters only for one on a capsule's axis
                 room.direction[count, 0], room.direction[count, 1], room.direction[count, 2] = 0.0, 0.0, 1.0
             count += 1
     o = some_of(room, 0, count)
@@ -151,11 +157,11 @@ def _show(
 
 @inlined
 def _take_readings(
-    sight: Sight, tracks: TrackState, readings: Readings, seen: Seen, fresh: BoolArray,
+    sight: Sight, tracks: TrackState, readings: Readings, scene: PerceivedScene, fresh: BoolArray,
     posture: tuple[Kinematics, Chain, FloatArray], instants: tuple[float, float], beside: Capsules,
 ) -> None:  # fmt: skip
-    """Take the readings that are new and show what is not known to be there into the tracks."""
-    skin, p, distance, cones = sight.skin, sight.perception, seen.distance, sight.skin.cones
+    """Update the tracks by the new readings; those of the arm and of fixtures are no obstacles."""
+    skin, p, distance, cones = sight.skin, sight.perception, scene.distance, sight.skin.cones
     (kin, chain, _), (now, posed) = posture, instants
     position, rotation = np.zeros((len(fresh), 3)), np.zeros((len(fresh), 3, 3))
     for k in range(len(fresh)):
@@ -163,16 +169,17 @@ def _take_readings(
             m = skin.link[k]
             pose_into(kin.position[m], kin.rotation[m], skin.T_link_sensor[k], position[k], rotation[k])
     sensors = Sensors(position, rotation, skin.link)
-    tells, shows = tells_anything(readings.distance, readings.status, distance, cones), ~np.isnan(distance)
-    # a return expected before `ends`, up to `margin_m` behind the reading, explains it: nothing is seen through a body
+    informative = is_informative(readings.distance, readings.status, distance, cones)
+    shows = ~np.isnan(distance)
+    # a return expected before `ends`, up to `margin_m` behind the reading, explains it: no beam passes a body
     ends = distance + sight.margin_m
     if sight.filters:
         if sight.sigmas > 0:
             widen(ends, sight.sigmas, skin, distance, sight.margin_m)
         leave_out(shows, fresh, distance, ends, p.self_aside_m, sensors, placed(sight.arm, kin), cones)
     if p.place_at_stamp:
-        # fixtures stand still, and are seen from where the units were; the arm's own links go along with them
-        # changes `position` and `rotation`, the arrays of `sensors`, for all that follows
+        # fixtures stand still, and the units saw them from their past poses; the arm's links moved with the units.
+        # This changes `position` and `rotation`, the arrays of `sensors`, for the rest of the function
         move_back(sensors, fresh, readings.stamp, chain, posed, p.persistence_s)
     if sight.filters:
         leave_out(shows, fresh, distance, ends, p.self_aside_m, sensors, beside, cones)
@@ -180,16 +187,16 @@ def _take_readings(
             if fresh[k] and shows[k]:
                 shows[k] = plane_return(sensors, k, sight.planes, cones, ends[k]) > ends[k]
     points = locate(position, rotation, distance)  # eq. 1
-    # both look at what was seen last, before `take_in` overwrites it
+    # both use the last points, before `update_tracks` overwrites them
     if p.reckon_below_minimum:
         reckon(points, distance, readings.stamp, tracks, sensors, cones, 3 * p.persistence_s)
     if sight.memory_s > 0.0:
-        counts = fresh & shows & (now - readings.stamp <= p.persistence_s)  # by `take_in`
+        counts = fresh & shows & (now - readings.stamp <= p.persistence_s)  # as in `update_tracks`
         follow_points(tracks, points, readings.stamp, counts, sight.memory_s)
     if p.out_of_view_s > 0:
-        give_up(tracks, sensors, fresh & tells, distance, now - p.persistence_s)
+        drop_refuted(tracks, sensors, fresh & informative, distance, now - p.persistence_s)
     for k in range(len(fresh)):
         if fresh[k] and shows[k] and np.isnan(tracks.direction[k, 0]):
-            # in place of a direction from the body that never was, the one the unit looks in
+            # without a direction from the body yet, the beam of the unit
             tracks.direction[k] = rotation[k, :, 2]
-    take_in(tracks, readings.stamp, points, fresh, shows, tells, now, p.persistence_s)
+    update_tracks(tracks, readings.stamp, points, (fresh, shows, informative), now, p.persistence_s)

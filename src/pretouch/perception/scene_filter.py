@@ -1,4 +1,4 @@
-"""Which returns come from the arm itself or from declared fixtures: ray casting against the model."""
+"""Filter of returns from the arm itself or from declared fixtures: ray casting against the model."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -18,7 +18,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Fixtures:
-    """What is known to stand around the arm: planes, and capsules on link 0, the world."""
+    """Known bodies around the arm: planes, and capsules on link 0, the world."""
 
     planes: FloatArray
     """(P, 4) rows (normal, offset): normal . p = offset, the normal pointing into free space."""
@@ -43,12 +43,12 @@ class Fixtures:
 
 
 def no_fixtures() -> Fixtures:
-    """Return an empty surrounding."""
+    """Return fixtures without any body."""
     return Fixtures(np.zeros((0, 4)), no_capsules())
 
 
 def floor_and_pedestal(floor: float, radius: float = 0.1) -> Fixtures:
-    """Return what every arm stands on: a floor at a height [m], base frame, and a pedestal of a radius [m]."""
+    """Return a floor at a height [m], base frame, and a pedestal of a radius [m] under the arm."""
     return Fixtures(
         planes=np.array([[0.0, 0.0, 1.0, floor]]),
         capsules=Capsules(
@@ -62,16 +62,16 @@ def floor_and_pedestal(floor: float, radius: float = 0.1) -> Fixtures:
 
 
 def expected_range(kin: Kinematics, sensors: Sensors, cones: Cones, body: Capsules, fixtures: Fixtures) -> FloatArray:
-    """Distance (K,) [m] at which each sensor would see the arm or a fixture, infinite where it would not.
+    """Return the distance (K,) [m] at which each sensor would see the arm or a fixture, infinite without a return.
 
-    The least over rays that fill the sensor's cone. A unit does not see the link it sits on.
+    It is the least over rays that fill the sensor's cone. A unit does not see its own link.
 
     Args:
         kin: posture.
         sensors: K of them, placed.
-        cones: what each sees.
+        cones: of the sensors.
         body: the arm as capsules, base included.
-        fixtures: what stands around it.
+        fixtures: around the arm.
     """
     near = np.array([plane_return(sensors, k, fixtures.planes, cones, np.inf) for k in range(len(sensors.link))])
     for part in (body, fixtures.capsules):
@@ -82,22 +82,22 @@ def expected_range(kin: Kinematics, sensors: Sensors, cones: Cones, body: Capsul
     return near
 
 
-class Wanted(NamedTuple):
-    """Which return is looked for."""
+class ReturnSearch(NamedTuple):
+    """Limits of the search for a return."""
 
     aside: float
-    """By how much capsules are taken to be thicker [m]."""
+    """Thickness that is added to capsules [m]."""
     beyond: float
-    """Distance before which a capsule does not count [m]."""
+    """Distance from which a return counts [m]."""
     within: float
-    """Distance up to which one counts [m]."""
+    """Distance up to which a return counts [m]."""
     enough: float
-    """The search ends with the first distance that counts and is no more [m], which then need not be the least."""
+    """Distance [m]: the first return that counts and is no farther ends the search; it need not be the nearest."""
 
 
 @compiled
 def bounds(capsules: Capsules) -> FloatArray:
-    """Spheres (4, C) round capsules, a little larger than they need to be: x, y, z and radius [m]."""
+    """Return spheres (4, C) round capsules, slightly larger than necessary: x, y, z and radius [m]."""
     _, a, b, radius = capsules
     spheres = np.empty((4, len(radius)))
     for c in range(len(radius)):
@@ -105,7 +105,7 @@ def bounds(capsules: Capsules) -> FloatArray:
         for i in range(3):
             spheres[i, c] = (a[c, i] + b[c, i]) / 2
             length2 += (b[c, i] - a[c, i]) ** 2
-        # larger by more than rounding, so that what is left out changes no bit of the answer
+        # larger by more than rounding, so that the capsules left out change no bit of the result
         spheres[3, c] = (np.sqrt(length2) / 2 + radius[c]) * (1 + 1e-12) + 1e-12
     return spheres
 
@@ -115,47 +115,47 @@ def leave_out(
     shows: BoolArray, fresh: BoolArray, distance: FloatArray, ends: FloatArray, aside: float, sensors: Sensors,
     capsules: Capsules, cones: Cones,
 ) -> None:  # fmt: skip
-    """Take from `shows` (K,) each fresh reading that a placed capsule explains: one seen up to its `ends` (K,) [m].
+    """Remove from `shows` (K,) each fresh reading that a placed capsule explains, by a return up to `ends` (K,) [m].
 
-    One that is missed by no more than `aside` [m] explains a `distance` (K,) [m] as far before as behind it.
+    A capsule that the cone misses by no more than `aside` [m] explains a `distance` (K,) [m] as far before as behind.
     """
     spheres = bounds(capsules)
     for k in range(len(shows)):
         end = ends[k]
         if fresh[k] and shows[k]:
-            # nothing farther explains the reading, and the first return within is enough
-            shows[k] = capsule_return(sensors, k, capsules, spheres, cones, Wanted(0.0, -np.inf, end, end)) > end
+            # a farther return does not explain the reading, and the first one within is enough
+            shows[k] = capsule_return(sensors, k, capsules, spheres, cones, ReturnSearch(0.0, -np.inf, end, end)) > end
         if fresh[k] and shows[k] and aside > 0:
-            # A capsule that is missed hides nothing behind it: only a reading from about there is taken for it. One
-            # that comes nearer than that is out at its first such ray.
-            nearby = Wanted(aside, 2 * distance[k] - end, end, 2 * distance[k] - end)
+            # A capsule that the cone misses hides nothing behind it: only a reading from about there belongs to it. A
+            # capsule with a nearer ray does not count.
+            nearby = ReturnSearch(aside, 2 * distance[k] - end, end, 2 * distance[k] - end)
             shows[k] = capsule_return(sensors, k, capsules, spheres, cones, nearby) > end
 
 
 @compiled
 def nearest_capsule(sensors: Sensors, k: int, capsules: Capsules, spheres: FloatArray, cones: Cones) -> float:
-    """Least distance [m] at which sensor k sees a placed capsule; `spheres` are those of `bounds`."""
-    return capsule_return(sensors, k, capsules, spheres, cones, Wanted(0.0, -np.inf, np.inf, -np.inf))
+    """Return the least distance [m] at which sensor k sees a placed capsule; `spheres` are those of `bounds`."""
+    return capsule_return(sensors, k, capsules, spheres, cones, ReturnSearch(0.0, -np.inf, np.inf, -np.inf))
 
 
 @kernel
 def capsule_return(
-    sensors: Sensors, k: int, capsules: Capsules, spheres: FloatArray, cones: Cones, wanted: Wanted
+    sensors: Sensors, k: int, capsules: Capsules, spheres: FloatArray, cones: Cones, search: ReturnSearch
 ) -> float:
-    """Least distance [m] at which sensor k sees a capsule that counts, infinite for none; `spheres` of `bounds`."""
+    """Return the least distance [m] at which sensor k sees a capsule that counts, infinite without one."""
     position, rotation, link, own = sensors.position, sensors.rotation, capsules.link, sensors.link[k]
     edge, rays = cones.edge[cones.kind[k]], cones.rays[cones.kind[k]]
     cos, sin = edge[0], edge[1]
     far2, x, y, z = np.empty(len(link)), position[k, 0], position[k, 1], position[k, 2]
-    for c in range(len(link)):  # apart from the loop below: the processor does four turns at once
+    for c in range(len(link)):  # a loop of its own: the processor runs four iterations at once
         u, v, w = spheres[0, c] - x, spheres[1, c] - y, spheres[2, c] - z
         far2[c] = u * u + v * v + w * w
     bx, by, bz = rotation[k, 0, 2], rotation[k, 1, 2], rotation[k, 2, 2]
     start = position[k, 0] * bx + position[k, 1] * by + position[k, 2] * bz
     least = np.inf
     for c in range(len(link)):
-        reach = spheres[3, c] + wanted.aside + _ROUNDING
-        if link[c] == own or far2[c] > (wanted.within + reach) ** 2:  # a unit does not see its own link
+        reach = spheres[3, c] + search.aside + _ROUNDING
+        if link[c] == own or far2[c] > (search.within + reach) ** 2:  # a unit does not see its own link
             continue
         # the cone can meet the sphere only if it is ahead, and if cos l - sin z <= reach as in `_cone_meets`
         along = spheres[0, c] * bx + spheres[1, c] * by + spheres[2, c] * bz - start
@@ -163,27 +163,27 @@ def capsule_return(
         inside = reach + sin * along
         if along < -reach or (far2[c] - along * along) * (cos * cos) > inside * inside:
             continue
-        # rays cost most: they are cast only at what passes both tests
-        if _cone_meets(sensors, k, capsules, c, edge, wanted):
-            at = _cast(sensors, k, capsules, c, rays, wanted)
-            if at >= wanted.beyond:
+        # rays cost most: they are cast only at capsules that pass both tests
+        if _cone_meets(sensors, k, capsules, c, edge, search):
+            at = _cast(sensors, k, capsules, c, rays, search)
+            if at >= search.beyond:
                 least = min(least, at)
-            if least <= wanted.enough:
+            if least <= search.enough:
                 return least
-    return least if least <= wanted.within else np.inf
+    return least if least <= search.within else np.inf
 
 
 @compiled
 def plane_return(sensors: Sensors, k: int, planes: FloatArray, cones: Cones, within: float) -> float:
-    """Least distance [m] at which sensor k sees a plane from its free side, infinite for none nearer than `within`."""
+    """Return the least distance [m] up to `within` at which sensor k sees a plane from its free side, else infinity."""
     position, rotation, rays = sensors.position, sensors.rotation, cones.rays[cones.kind[k]]
     least, R = np.inf, rotation[k]
     for m in range(len(planes)):
         normal = planes[m]
         height = normal[0] * position[k, 0] + normal[1] * position[k, 1] + normal[2] * position[k, 2] - normal[3]
-        # seen from its free side only; no ray comes to the plane in less than the height over it
+        # visible from its free side only; no ray reaches the plane within less than the height over it
         if 0 <= height <= within:
-            # in the sensor's frame, where the rays are given
+            # in the frame of the sensor and the rays
             x = normal[0] * R[0, 0] + normal[1] * R[1, 0] + normal[2] * R[2, 0]
             y = normal[0] * R[0, 1] + normal[1] * R[1, 1] + normal[2] * R[2, 1]
             z = normal[0] * R[0, 2] + normal[1] * R[1, 2] + normal[2] * R[2, 2]
@@ -195,8 +195,8 @@ def plane_return(sensors: Sensors, k: int, planes: FloatArray, cones: Cones, wit
 
 
 @inlined
-def _cone_meets(sensors: Sensors, k: int, capsules: Capsules, c: int, edge: FloatArray, wanted: Wanted) -> bool:
-    """Whether the cone of sensor k, of such an edge, can meet capsule c within what is wanted; never wrongly no.
+def _cone_meets(sensors: Sensors, k: int, capsules: Capsules, c: int, edge: FloatArray, search: ReturnSearch) -> bool:
+    """Return whether the cone of sensor k can meet capsule c within the search; false is always right.
 
     With z along the beam and l across it, z sin - l cos is by how much a point lies inside the tangent plane of the
     cone: no point of the capsule's axis may be farther out than the radius. On the axis that is a convex function,
@@ -204,14 +204,14 @@ def _cone_meets(sensors: Sensors, k: int, capsules: Capsules, c: int, edge: Floa
     """
     position, rotation, a, b = sensors.position, sensors.rotation, capsules.a, capsules.b
     cos, sin = edge[0], edge[1]
-    reach = capsules.radius[c] + wanted.aside + _ROUNDING
+    reach = capsules.radius[c] + search.aside + _ROUNDING
     ux, uy, uz = b[c, 0] - a[c, 0], b[c, 1] - a[c, 1], b[c, 2] - a[c, 2]
     x, y, z = a[c, 0] - position[k, 0], a[c, 1] - position[k, 1], a[c, 2] - position[k, 2]
     bx, by, bz = rotation[k, 0, 2], rotation[k, 1, 2], rotation[k, 2, 2]
     start, rise = x * bx + y * by + z * bz, ux * bx + uy * by + uz * bz
     if max(start, start + rise) < -reach:  # all of it is behind the sensor
         return False
-    if to_axis(position, k, a, b, c)[1] > wanted.within + reach:
+    if to_axis(position, k, a, b, c)[1] > search.within + reach:
         return False
     # across the beam: l(s)^2 = across + 2 s mixed + s^2 slope along the axis, s from 0 to 1
     across = max(0.0, x * x + y * y + z * z - start * start)
@@ -235,14 +235,14 @@ def _cone_meets(sensors: Sensors, k: int, capsules: Capsules, c: int, edge: Floa
 
 
 @inlined
-def _cast(sensors: Sensors, k: int, capsules: Capsules, c: int, rays: FloatArray, wanted: Wanted) -> float:
-    """Least distance [m] to capsule c along the rays of sensor k, or the first one that is enough."""
+def _cast(sensors: Sensors, k: int, capsules: Capsules, c: int, rays: FloatArray, search: ReturnSearch) -> float:
+    """Return the least distance [m] to capsule c along the rays of sensor k, or the first one that is enough."""
     position, rotation, a, b = sensors.position, sensors.rotation, capsules.a, capsules.b
-    radius = capsules.radius[c] + wanted.aside
+    radius = capsules.radius[c] + search.aside
     ux, uy, uz = b[c, 0] - a[c, 0], b[c, 1] - a[c, 1], b[c, 2] - a[c, 2]
     x, y, z = position[k, 0] - a[c, 0], position[k, 1] - a[c, 1], position[k, 2] - a[c, 2]
     R = rotation[k]
-    # in the sensor's frame, where the rays are given
+    # in the frame of the sensor and the rays
     ux, uy, uz = (
         R[0, 0] * ux + R[1, 0] * uy + R[2, 0] * uz,
         R[0, 1] * ux + R[1, 1] * uy + R[2, 1] * uz,
@@ -262,14 +262,14 @@ def _cast(sensors: Sensors, k: int, capsules: Capsules, c: int, rays: FloatArray
         ar = ux * rays[i, 0] + uy * rays[i, 1] + uz * rays[i, 2]
         rest = x * rays[i, 0] + y * rays[i, 1] + z * rays[i, 2]
         least = min(least, _from_outside(aa, ao, oo, ar, rest, radius))
-        if least <= wanted.enough:
+        if least <= search.enough:
             break
     return least
 
 
 @kernel
 def ray_capsule(p: FloatArray, ray: FloatArray, a: FloatArray, b: FloatArray, radius: float) -> float:
-    """Distance [m] along a unit ray (3,) from p (3,) to a capsule, 0 from inside, infinite for a miss."""
+    """Return the distance [m] along a unit ray (3,) from p (3,) to a capsule, 0 from inside, infinite for a miss."""
     axis, offset = b - a, p - a
     aa, ao, oo = dot(axis, axis), dot(axis, offset), dot(offset, offset)
     if _inside(aa, ao, oo, radius):
@@ -279,14 +279,14 @@ def ray_capsule(p: FloatArray, ray: FloatArray, a: FloatArray, b: FloatArray, ra
 
 @kernel
 def _inside(aa: float, ao: float, oo: float, radius: float) -> bool:
-    """Whether a point lies in a capsule; aa, ao and oo are products of its axis a and the point's offset o from it."""
+    """Return whether a point is in a capsule; aa, ao, oo are products of the axis a and the point's offset o."""
     along = 0.0 if aa == 0 else min(1.0, max(0.0, ao / aa))
     return bool(oo - along * (2 * ao - along * aa) <= radius * radius)  # |o - s a|^2 <= r^2
 
 
 @kernel
 def _from_outside(aa: float, ao: float, oo: float, ar: float, rest: float, radius: float) -> float:
-    """Answer of `ray_capsule` outside of it; as for `_inside`, and with the ray r, ar = a . r and rest = o . r."""
+    """Return the distance of `ray_capsule` from outside; see `_inside`; with the ray r, ar = a . r and rest = o . r."""
     best = np.inf
     # the endless cylinder round the axis: quad t^2 + 2 half_b t + (aa oo - ao^2 - r^2 aa) = 0 with |r| = 1
     quad = aa - ar * ar

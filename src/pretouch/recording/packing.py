@@ -128,7 +128,7 @@ def _buries(hint: Any, above: tuple[Any, ...] = ()) -> bool:
 def _owner(state: type) -> str:
     """Name the part whose state a class is: its group and its name."""
     for group, interface in Part.interfaces.items():
-        for name, part in interface.known.items():
+        for name, part in interface.registry.items():
             if part.State is state:
                 return f"{group} {name}"
     raise RecordingError(

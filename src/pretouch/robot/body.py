@@ -1,4 +1,4 @@
-"""The body of an arm as capsules fixed to its links, and places spread over its surface, where it may be touched."""
+"""The body of an arm as capsules fixed to its links, and points on its surface, where it may be touched."""
 
 from typing import Annotated, NamedTuple
 
@@ -24,13 +24,13 @@ class Capsules(NamedTuple):
     """(C,) [m]."""
 
     def of_links(self, links: IntArray) -> "Capsules":
-        """Return the capsules on the given links, in order."""
+        """Return the capsules on some links, in order."""
         keep = np.isin(self.link, links)
         return Capsules(self.link[keep], self.a[keep], self.b[keep], self.radius[keep])
 
 
 def no_capsules() -> Capsules:
-    """Return none."""
+    """Return no capsules."""
     return Capsules(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
 
 
@@ -67,7 +67,7 @@ def capsules_of(model: mujoco.MjModel) -> Capsules:
 
 
 def from_axes(points: FloatArray, a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Where on axes a to b (C, 3) points (P, 3) are nearest, 0 to 1 (P, C), and the ways from there (P, C, 3) [m].
+    """Return the nearest places of points (P, 3) on axes a to b (C, 3), 0 to 1 (P, C), and the offsets (P, C, 3) [m].
 
     `to_axis` is the same for compiled code.
     """
@@ -78,7 +78,7 @@ def from_axes(points: FloatArray, a: FloatArray, b: FloatArray) -> tuple[FloatAr
 
 @kernel
 def to_axis(point: FloatArray, k: int, a: FloatArray, b: FloatArray, c: int) -> tuple[float, float]:
-    """Where on the segment from a[c] to b[c] point[k] is closest, from 0 to 1, and how far from it [m]."""
+    """Return the place on the segment from a[c] to b[c] closest to point[k], from 0 to 1, and the distance [m]."""
     ux, uy, uz = b[c, 0] - a[c, 0], b[c, 1] - a[c, 1], b[c, 2] - a[c, 2]
     x, y, z = point[k, 0] - a[c, 0], point[k, 1] - a[c, 1], point[k, 2] - a[c, 2]
     length2 = ux * ux + uy * uy + uz * uz
@@ -89,13 +89,13 @@ def to_axis(point: FloatArray, k: int, a: FloatArray, b: FloatArray, c: int) -> 
 
 
 SPACING_M = 0.025
-"""About the distance between neighbouring places [m]: places are interpolated between them."""
+"""Approximate distance between neighbouring points [m]; places are interpolated between them."""
 _MOST_CAPSULES, _MOST_AREA = 200, 50.0
 """Capsules that joints move, and their area [m^2]: a Panda has 18 and 0.9 m^2. Time grows with the product of both."""
 
 
 class Surface(NamedTuple):
-    """N places on the outside of the capsules that joints move, those of a rigid body one after the other."""
+    """N points on the outside of the capsules that joints move, those of a rigid body one after the other."""
 
     link: IntArray
     """(N,) index of the link each is fixed to."""
@@ -104,15 +104,15 @@ class Surface(NamedTuple):
     normal: FloatArray
     """(N, 3) outward unit normals, link frame."""
     area: FloatArray
-    """(N,) surface each stands for [m^2]."""
+    """(N,) surface area of each [m^2]."""
     body: IntArray
-    """(N,) the rigid body each belongs to, from 0 at the base: links that the same joints move are one."""
+    """(N,) rigid body of each, from 0 at the base: links that the same joints move are one body."""
     first: IntArray
-    """(B + 1,) where the places of each rigid body begin, and N."""
+    """(B + 1,) index of the first point of each rigid body, and N."""
 
 
 def bodies_of(moved_by: BoolArray) -> IntArray:
-    """Return the rigid body (L,) of each link, given the joints (L, n) that move it; -1 of links that none moves."""
+    """Return the rigid body (L,) of each link, from the joints (L, n) that move it; -1 for links that none moves."""
     patterns = [tuple(row) for row in moved_by.tolist()]
     bodies: dict[tuple[bool, ...], int] = {}
     for pattern in patterns:
@@ -122,13 +122,13 @@ def bodies_of(moved_by: BoolArray) -> IntArray:
 
 
 def surface_of(body: Capsules, moved_by: BoolArray, kin: Kinematics, spacing: float = SPACING_M) -> Surface:
-    """Spread places over C capsules, but for those inside another capsule of the same rigid body.
+    """Return points spread over C capsules, without those inside another capsule of the same rigid body.
 
     Args:
         body: the capsules.
         moved_by: (L, n) whether a joint moves a link.
         kin: any one posture.
-        spacing: about the distance of neighbours [m].
+        spacing: approximate distance of neighbours [m].
 
     Raises RobotModelError for a body far larger than any arm's.
     """
@@ -148,9 +148,8 @@ def surface_of(body: Capsules, moved_by: BoolArray, kin: Kinematics, spacing: fl
         free = (away > body.radius[others]).all(axis=1)
         link = int(body.link[c])
         R = kin.rotation[link]
-        parts.append((
-            np.full(int(free.sum()), link), (point[free] - kin.position[link]) @ R, normal[free] @ R, area[free]
-        ))  # fmt: skip
+        local = (point[free] - kin.position[link]) @ R
+        parts.append((np.full(int(free.sum()), link), local, normal[free] @ R, area[free]))
     links, points, normals, areas = (np.concatenate(group) for group in zip(*parts, strict=True))
     count = rigid[links]
     first = np.searchsorted(count, np.arange(int(rigid.max()) + 2))

@@ -1,4 +1,4 @@
-"""What is known of an arm beside its MJCF: limits, names, postures and where each figure comes from, in robot.toml."""
+"""Description of an arm beside its MJCF, in robot.toml: limits, names, a posture and the sources of the figures."""
 
 from dataclasses import dataclass, replace
 from hashlib import sha256
@@ -19,7 +19,7 @@ _TEXTS = ("name", "mjcf", "ee_body", "source")
 _LISTS = {"qd_max": "rad/s", "qdd_max": "rad/s^2", "tau_max": "Nm", "q_ready": "rad"}
 _ENVELOPE = {"offset": "rad/s", "slope": "rad/s^2", "q_upper": "rad", "q_lower": "rad"}
 _LARGEST = 1e6
-"""Largest number in a file: any larger one is a mistake."""
+"""Largest number in a file: a larger one is a mistake."""
 _SHIPPED = Path(str(files("pretouch.robot") / "data"))
 
 
@@ -28,8 +28,8 @@ class SpeedEnvelope:
     """Speed limits of n joints that fall towards the ends of their ranges, as a robot's interface enforces them.
 
     Towards its upper end a joint at q may move at max(0, -offset + sqrt(slope (q_upper - q))), towards its lower end at
-    max(0, -offset + sqrt(slope (q - q_lower))), whatever its constant limit allows beyond that. Each reaches zero
-    offset^2 / slope before its reference. Away from an end nothing is asked.
+    max(0, -offset + sqrt(slope (q - q_lower))), even if its constant limit is larger. Each reaches zero
+    offset^2 / slope before its reference. Away from an end there is no limit.
     """
 
     offset: FloatArray
@@ -41,7 +41,7 @@ class SpeedEnvelope:
     q_lower: FloatArray
     """(n,) reference of the lower side [rad]."""
     source: str
-    """Where the figures were read."""
+    """Source of the figures."""
 
     def __post_init__(self) -> None:
         shape = self.offset.shape
@@ -83,9 +83,9 @@ class RobotDescription:
     tau_max: FloatArray
     """(n,) joint torque limits [Nm]."""
     q_ready: FloatArray
-    """(n,) usual posture to start from [rad]."""
+    """(n,) ready posture, the usual start [rad]."""
     source: str
-    """Where the limits were read."""
+    """Source of the limits."""
     envelope: SpeedEnvelope | None = None
     """Speed limits that depend on the position, beside `qd_max`; None if there are none."""
 
@@ -117,18 +117,18 @@ def fr3() -> RobotDescription:
 
 
 ROBOTS = {"panda": panda, "fr3": fr3}
-"""Those that come with the package."""
+"""Arms of the package."""
 
 
 def is_shipped(arm: RobotDescription) -> bool:
-    """Whether an arm's model is one that comes with the package: a Panda or an FR3."""
+    """Return whether an arm's model is one of the package: a Panda or an FR3."""
     return arm.mjcf.parent == _SHIPPED
 
 
 def robot_named(name: str) -> RobotDescription:
     """Return the description of an arm, by its name or by the folder or robot.toml that it was imported to.
 
-    Raises RobotModelError where there is neither, or where the file is wrong.
+    Raises RobotModelError if there is neither, or if the file is wrong.
     """
     if name in ROBOTS:
         return ROBOTS[name]()
@@ -143,7 +143,7 @@ def robot_named(name: str) -> RobotDescription:
 def load_description(path: Path | str) -> RobotDescription:
     """Read the description of an arm from robot.toml, or from the folder that holds it.
 
-    What is wrong with it is a RobotModelError that names the file, the key, the value and the way out.
+    A mistake in it is a RobotModelError that names the file, the key, the value and the way out.
     """
     path = Path(path)
     if path.is_dir():
@@ -162,7 +162,7 @@ def load_description(path: Path | str) -> RobotDescription:
 
 
 def description_text(arm: RobotDescription, mjcf: str = "") -> str:
-    """Return the robot.toml that `load_description` reads back to the same arm, beside its MJCF file of this name."""
+    """Return a text of robot.toml from which `load_description` reads the same arm, with an MJCF file of this name."""
     texts = {"name": arm.name, "mjcf": mjcf or arm.mjcf.name, "ee_body": arm.ee_body, "source": arm.source}
     e = arm.envelope
     envelope = {} if e is None else {"envelope": _lists(e, _ENVELOPE) | {"source": e.source}}

@@ -1,4 +1,4 @@
-"""Chains of hinges, which may branch: where links and joints are, Jacobians, the mass matrix, and how links move."""
+"""Kinematics of chains of hinges, which may branch: poses, Jacobians, the mass matrix, and velocities of points."""
 
 import math
 from typing import Annotated, NamedTuple
@@ -10,10 +10,10 @@ from pretouch.types import BoolArray, FloatArray, IntArray
 
 
 class Hinges(NamedTuple):
-    """How links hang on each other: a link's joints turn it in the order of q, on its own place on its parent."""
+    """Tree of the links: each link is fixed to its parent by its joints, in the order of q."""
 
     parent: Annotated[IntArray, "L"]
-    """(L,) link that each hangs on, of a smaller index; the world's own is 0."""
+    """(L,) parent of each link, with a smaller index; that of the world is 0."""
     first: Annotated[IntArray, "L + 1"]
     """(L + 1,) index of the first joint of each link, and n."""
     T_parent_link: Annotated[FloatArray, "L", 3, 4]
@@ -22,8 +22,8 @@ class Hinges(NamedTuple):
     """(n, 7) of each joint a point on its axis [m] and the axis, frame of its link, and q at rest [rad]."""
 
 
-class Arm(NamedTuple):
-    """What moves what, of `RobotModel`. L links, n joints."""
+class ArmTopology(NamedTuple):
+    """Joints that move each link, of `RobotModel`. L links, n joints."""
 
     moved_by: Annotated[BoolArray, "L", "n"]
     """(L, n) whether a joint moves a link."""
@@ -32,7 +32,7 @@ class Arm(NamedTuple):
 
 
 class Links(NamedTuple):
-    """Masses and places of the links, of `RobotModel`."""
+    """Masses and centres of the links, of `RobotModel`."""
 
     mass: Annotated[FloatArray, "L"]
     """(L,) [kg]."""
@@ -43,18 +43,18 @@ class Links(NamedTuple):
     parts: Annotated[IntArray, "P"]
     """(P,) links of the body that joints move."""
     middle: Annotated[FloatArray, "P", 3]
-    """(P, 3) the middle of each one's capsules, link frame [m]."""
+    """(P, 3) centre of the capsules of each, link frame [m]."""
 
 
 class Mechanism(NamedTuple):
     """An arm with its masses."""
 
-    arm: Arm
+    arm: ArmTopology
     links: Links
 
 
 class Kinematics(NamedTuple):
-    """Where everything is in one posture, base frame. L links (bodies of the MJCF, world first), n joints."""
+    """Poses of links and joint axes in one posture, base frame. L links (bodies of the MJCF, world first), n joints."""
 
     position: Annotated[FloatArray, "L", 3]
     """(L, 3) link origins [m]."""
@@ -67,7 +67,7 @@ class Kinematics(NamedTuple):
 
 
 class Chain(NamedTuple):
-    """The moving joints (n,) in one posture: what a point's Jacobian and its speed are made of."""
+    """The moving joints (n,) in one posture, for Jacobians and velocities of points."""
 
     anchor: FloatArray
     """(n, 3) a point on each axis [m]."""
@@ -150,7 +150,7 @@ def row_along(chain: Chain, link: int, point: FloatArray, along: FloatArray, row
 def jacobian_into(
     anchor: FloatArray, axis: FloatArray, moved: BoolArray, point: FloatArray, jacobian: FloatArray
 ) -> None:
-    """Write the Jacobian (6, n) of `RobotModel.jacobian`; `moved` (n,) says which joints move the link."""
+    """Write the Jacobian (6, n) of `RobotModel.jacobian`; `moved` (n,) marks the joints that move the link."""
     for j in range(len(anchor)):
         for i in range(6):
             jacobian[i, j] = 0.0
@@ -231,7 +231,7 @@ def tangents_of(normal: FloatArray, tangents: FloatArray) -> None:
 
 @compiled
 def below(numbers: FloatArray, bound: float) -> bool:
-    """Whether all numbers (k,) are smaller than a bound in size; one that is NaN is not."""
+    """Return whether all numbers (k,) are smaller than a bound in size; NaN is not."""
     for number in numbers:  # noqa: SIM110  compiled code knows no generators
         if not abs(number) < bound:
             return False
@@ -242,8 +242,8 @@ def below(numbers: FloatArray, bound: float) -> bool:
 def rotation_error(rotation: FloatArray, goal: FloatArray) -> FloatArray:
     """Rotation from one orientation to the other (3,): the unit axis times the sine of the angle, base frame."""
     error = np.zeros(3)
-    # Half the sum of the cross products of each axis of the one with its like of the other. The sine falls again beyond
-    # a right angle and is 0 for a half turn: good for holding an orientation, not for turning to a far one.
+    # Half the sum of the cross products of corresponding axes. The sine falls again beyond a right angle and is 0 for a
+    # half turn: it serves to hold an orientation, not to turn to a distant one.
     for i in range(3):
         x, y, z = rotation[0, i], rotation[1, i], rotation[2, i]
         error[0] += 0.5 * (y * goal[2, i] - z * goal[1, i])

@@ -6,17 +6,26 @@ import numpy as np
 from pretouch.errors import RobotModelError
 from pretouch.robot.body import Capsules, Surface, bodies_of, capsules_of, surface_of
 from pretouch.robot.description import RobotDescription
-from pretouch.robot.kinematics import Arm, Hinges, Kinematics, Links, Mechanism, jacobian_into, mass_matrix_into, place
+from pretouch.robot.kinematics import (
+    ArmTopology,
+    Hinges,
+    Kinematics,
+    Links,
+    Mechanism,
+    jacobian_into,
+    mass_matrix_into,
+    place,
+)
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 
 class RobotModel:
     """Poses, Jacobians of any body point, mass matrix, Coriolis and gravity torques of an arm.
 
-    Rotor inertia and damping of the MJCF are left out: the joint torque sensors sit on the link side. All answers
-    depend on the arguments alone. `kinematics`, Jacobians and `mass_matrix`, all that a controller asks for, may be
-    asked for from any thread. `mass_matrix_and_bias` works in MuJoCo's memory, the `scratch`: it serves one thread at a
-    time.
+    Rotor inertia and damping of the MJCF are left out: the joint torque sensors are on the link side. All results
+    depend on the arguments alone. `kinematics`, Jacobians and `mass_matrix`, the methods that a controller calls, are
+    safe in any thread. `mass_matrix_and_bias` works in MuJoCo's memory, the `scratch`: one thread at a time may call
+    it.
     """
 
     def __init__(self, description: RobotDescription) -> None:
@@ -31,7 +40,7 @@ class RobotModel:
         self._model.dof_damping[:] = 0.0
         self._data = mujoco.MjData(self._model)
         self.scratch = self._model, self._data
-        """MuJoCo's model and data, for compiled code that does in them what the methods here do."""
+        """MuJoCo's model and data, for compiled code that calls MuJoCo as the methods here do."""
         self.n: int = self._model.nv
         self._check()
         self.links: tuple[str, ...] = tuple(self._model.body(i).name for i in range(self._model.nbody))
@@ -43,7 +52,7 @@ class RobotModel:
         self.capsules: Capsules = capsules_of(self._model)
         """The body, base included."""
         self.hinges = _hinges(self._model)
-        """How the links hang on each other, for compiled code."""
+        """Tree of the links, for compiled code."""
         self._shapes = (len(self.links), 3), (len(self.links), 3, 3), (self.n, 3)
         self.moved_by: BoolArray = self._moved_by()
         """(L, n) whether a joint moves a link."""
@@ -52,17 +61,19 @@ class RobotModel:
         if not len(self.body.link):
             raise RobotModelError(f"{description.name}: no joint moves a capsule: give the links capsule geoms.")
         self.apart: IntArray = self._pairs_apart()
-        """(P, 2) pairs of capsules that two joints or more part, by their index; see `robot.postures`."""
+        """(P, 2) pairs of capsules with two joints or more between them, by their index; see `robot.postures`."""
         self.parts: IntArray = np.unique(self.body.link)
         """(P,) links of the body."""
         centers = (self.body.a + self.body.b) / 2
         middle = np.array([centers[self.body.link == part].mean(axis=0) for part in self.parts])
         mass, com = self._model.body_mass.copy(), self._model.body_ipos.copy()
-        self.mechanism = Mechanism(Arm(self.moved_by, self.ee), Links(mass, com, self._inertia(), self.parts, middle))
+        self.mechanism = Mechanism(
+            ArmTopology(self.moved_by, self.ee), Links(mass, com, self._inertia(), self.parts, middle)
+        )
         """Its links, for compiled code."""
         rest = self.kinematics(np.zeros(self.n))
         self.surface: Surface = surface_of(self.body, self.moved_by, rest)
-        """Places where the arm may be touched."""
+        """Points on the surface of the arm, where it may be touched."""
         self.rigid: IntArray = bodies_of(self.moved_by)
         """(L,) the rigid body each link belongs to, from 0; -1 of links that no joint moves."""
         self.q_min: FloatArray = self._model.jnt_range[:, 0].copy()
@@ -70,7 +81,7 @@ class RobotModel:
         self.q_mid: FloatArray = (self.q_min + self.q_max) / 2
 
     def _check(self) -> None:
-        """Refuse models the rest of the package would misunderstand."""
+        """Refuse models that the package does not support."""
         name = self.description.name
         if self.n != len(self.description.q_ready):
             raise RobotModelError(f"{name}: the MJCF has {self.n} joints, q_ready {len(self.description.q_ready)}.")
@@ -109,7 +120,7 @@ class RobotModel:
         return principal
 
     def link_index(self, name: str) -> int:
-        """Return the index of a link; an unknown name is a RobotModelError that lists those there are."""
+        """Return the index of a link; an unknown name is a RobotModelError that lists the links."""
         try:
             return self.links.index(name)
         except ValueError:
@@ -157,7 +168,7 @@ class RobotModel:
 
 
 def _hinges(model: mujoco.MjModel) -> Hinges:
-    """Return how the links of a model of hinges alone hang on each other."""
+    """Return the tree of the links of a model whose joints are all hinges."""
     T, R = np.empty((model.nbody, 3, 4)), np.empty(9)
     for link in range(model.nbody):
         mujoco.mju_quat2Mat(R, model.body_quat[link])

@@ -1,9 +1,9 @@
-"""Postures: inverse kinematics by damped least squares, and how near an arm comes to itself in many at once.
+"""Postures: inverse kinematics by damped least squares, and self-distances of an arm in many postures at once.
 
-Pairs of links that are fixed to each other, or that a single joint parts, are left out: how near they come is settled
-by the joint's range, and at the joint their capsules overlap whatever the posture. All other pairs count, the base's
-too. Of the Panda's and the FR3's, each comes apart somewhere, and several can collide within the joints' ranges: the
-hand and the last link with the forearm, the forearm with the upper arm.
+Pairs of links that are fixed to each other, or with a single joint between them, are left out: the joint's range limits
+their approach, and at the joint their capsules overlap in any posture. All other pairs count, the base's too. Those of
+the Panda and the FR3 all come apart in some posture, and several can collide within the joints' ranges: the hand and
+the last link with the forearm, the forearm with the upper arm.
 """
 
 from collections.abc import Callable
@@ -17,46 +17,46 @@ from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray
 
 _TRIED = 100
-"""Postures in which pairs of links may come apart."""
+"""Postures in which pairs of links are checked."""
 
 
 class Reaching(NamedTuple):
-    """How a hand is brought to a place."""
+    """Parameters of inverse kinematics."""
 
     steps: int
-    """At most."""
+    """Largest number of steps."""
     step_max: float
-    """Largest motion of a joint in one step, within which the Jacobian is taken for constant [rad]."""
+    """Largest motion of a joint in one step, for which the Jacobian counts as constant [rad]."""
     damping: float
-    """Of the pseudo-inverse: near singularities the hand is slow, and drawn off its place by `pull`."""
+    """Damping of the pseudo-inverse: near singularities the hand is slow, and `pull` moves it off its place."""
     pull: float = 0.0
-    """Part of the way to the posture at rest that is gone in one step, as far as the hand stays where it is."""
+    """Part of the motion to the posture at rest in one step, as far as the hand does not move."""
     close: float = 1e-4
-    """Largest entry of the error of a hand that is there [m, rad]."""
+    """Largest entry of the error of a hand at its goal [m, rad]."""
 
 
 def posture_at(
     model: RobotModel, q: FloatArray, error_of: Callable[[Kinematics], FloatArray], rest: FloatArray, way: Reaching
 ) -> FloatArray | None:
-    """Move an arm from q (n,) until its hand is where it is to be; None where its joint limits are in the way.
+    """Move an arm from q (n,) until its hand is at its goal; None where the joint limits prevent that.
 
-    `error_of` gives the motion (6,) that the end-effector still has to make, translation [m] then rotation [rad];
-    `rest` is the posture (n,) that the arm is drawn to [rad].
+    `error_of` gives the remaining motion (6,) of the end-effector, translation [m] then rotation [rad]; `rest` is the
+    posture (n,) to which the arm is pulled [rad].
     """
     for _ in range(way.steps):
         kin = model.kinematics(q)
         error = error_of(kin)
         if np.abs(error).max() < way.close:
             return q
-        J, drawn = model.ee_jacobian(kin), way.pull * (rest - q)
+        J, pull = model.ee_jacobian(kin), way.pull * (rest - q)
         # damped least squares: no step explodes near a singularity, and elsewhere the damping costs a few steps more
-        step = drawn + J.T @ np.linalg.solve(J @ J.T + way.damping * np.eye(6), error - J @ drawn)
+        step = pull + J.T @ np.linalg.solve(J @ J.T + way.damping * np.eye(6), error - J @ pull)
         q = np.clip(q + step * min(1.0, way.step_max / max(np.abs(step).max(), 1e-12)), model.q_min, model.q_max)
     return None
 
 
 def brought_to(model: RobotModel, point: FloatArray) -> FloatArray:
-    """Joint positions (n,) [rad] of the ready posture, its hand moved to a point (3,) [m] without being turned.
+    """Return joint positions (n,) [rad] of the ready posture with its hand moved to a point (3,) [m], not turned.
 
     Raises ExperimentError where the arm cannot reach it within its joint limits.
     """
@@ -81,7 +81,7 @@ def kinematics_of(model: RobotModel, q: FloatArray) -> Kinematics:
 
 
 def capsule_ends(model: RobotModel, kin: Kinematics) -> FloatArray:
-    """Where both ends of the axes of all C capsules are in S postures (S, C, 2, 3) [m], base frame."""
+    """Return both ends of the axes of all C capsules in S postures (S, C, 2, 3) [m], base frame."""
     body = model.capsules
     ends = np.stack([body.a, body.b], axis=1)
     return kin.position[:, body.link, None] + ends @ kin.rotation[:, body.link].swapaxes(-1, -2)
@@ -109,9 +109,9 @@ def spread(count: int, dimensions: int, skip: int = 20) -> FloatArray:
 
 
 def ever_apart(model: RobotModel, by: float = 0.0) -> BoolArray:
-    """Whether the pairs (P,) of `RobotModel.apart` come apart, by more than `by` [m], in some of many postures.
+    """Return whether the pairs (P,) of `RobotModel.apart` come apart, by more than `by` [m], in some of many postures.
 
-    In a short wrist not all do; nor does an upper arm that turns close above its base, whatever the posture.
+    In a short wrist not all do; nor does an upper arm that turns close above its base in any posture.
     """
     q = model.q_min + spread(_TRIED, model.n) * (model.q_max - model.q_min)
     ends = capsule_ends(model, kinematics_of(model, q))
@@ -125,11 +125,11 @@ def segment_distance(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray)
 
 
 def nearest_points(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Where segments a to b and c to d, each (..., 3), are nearest to each other, on each (..., 3) [m].
+    """Return the nearest points of segments a to b and c to d, each (..., 3), on each (..., 3) [m].
 
-    A segment may be a point. The nearest point of the one is that nearest to the line of the other, moved into its
-    segment; then each is once brought to where it is nearest to the other (Ericson, Real-Time Collision Detection,
-    5.1.9). Of parallel segments any nearest pair will do.
+    A segment may be a point. The first point is that nearest to the line of the other segment, moved into its own
+    segment; then each is once moved to the point nearest to the other (Ericson, Real-Time Collision Detection, 5.1.9).
+    For parallel segments, any nearest pair is right.
     """
     u, v, w = b - a, d - c, a - c
     uu, uv, vv, uw, vw = (_dot(*pair) for pair in ((u, u), (u, v), (v, v), (u, w), (v, w)))
@@ -145,6 +145,6 @@ def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def _within(numerator: FloatArray, denominator: FloatArray) -> FloatArray:
-    """Quotient brought into 0 to 1; 0 where the denominator is."""
+    """Return the quotient limited to 0 to 1; 0 where the denominator is 0."""
     none = denominator <= 0.0
     return np.where(none, 0.0, np.clip(numerator / np.where(none, 1.0, denominator), 0.0, 1.0))

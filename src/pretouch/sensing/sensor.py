@@ -1,4 +1,4 @@
-"""What a unit measures with: a type of range finder as its data sheet describes it, or as a skin file does."""
+"""Types of range finders, as their data sheets or skin files describe them."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -13,16 +13,16 @@ from pretouch.errors import ParameterError, SkinError
 from pretouch.types import FloatArray, IntArray, Number
 
 MOST_ZONES = 8
-"""Zones along a side: a type with more is a depth camera, whose points are an outside source."""
+"""Zones along a side, at most: a type with more is a depth camera, an outside source of points."""
 RINGS = 2
-"""Circles of rays that stand for what a sensor sees: with its axis 19 rays."""
+"""Circles of rays that represent a sensor's cone: with its axis 19 rays."""
 _Angle = Annotated[float, Check(low=0.0, high=120.0, open_low=True)]
 _Zones = Annotated[int, Check(low=1, high=MOST_ZONES)]
 
 
 @dataclass(frozen=True)
 class RangingMode:
-    """How a sensor measures: a distance mode with a timing budget that serves it."""
+    """A distance mode of a sensor, with a suitable timing budget."""
 
     period_s: float
     """Time between readings: timing budget plus overhead [s]."""
@@ -32,9 +32,9 @@ class RangingMode:
 
 @dataclass(frozen=True)
 class Sensor(Part, group="pretouch.sensors"):
-    """A range finder that sees one cone about its axis, or a square of zones that each measure a distance.
+    """A range finder with one cone about its axis, or a square of zones that each measure a distance.
 
-    A type of one's own is a subclass with a name and defaults of its own, or a table in a skin file.
+    A type of your own is a subclass with a name and its own defaults, or a table in a skin file.
     """
 
     field_of_view_deg: _Angle = 27.0
@@ -42,15 +42,15 @@ class Sensor(Part, group="pretouch.sensors"):
     zones: _Zones = 1
     """Zones along each side of the square; 1: one cone."""
     nearest_m: Positive = 0.04
-    """Smallest distance it measures [m]; what is nearer is taken to be there."""
+    """Smallest distance it measures [m]; nearer targets count as there."""
     farthest_m: Positive = 4.0
     """Largest distance it measures [m]."""
     rate_hz: Positive = 50.0
     """Readings in a second, at most [Hz]."""
     noise: Positive = 1.0
-    """Times the noise of the VL53L1X in the simulation."""
+    """Noise relative to the VL53L1X's in the simulation [1]."""
     own_name: str = ""
-    """What a skin file calls it, where it is of a type of that file's own."""
+    """Name in the skin file that describes it; '' for other types."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -61,40 +61,40 @@ class Sensor(Part, group="pretouch.sensors"):
             )
 
     def ranging(self, mode: str) -> RangingMode:
-        """Return how it measures in a distance mode of its own; one without modes does so in one way."""
+        """Return one of its distance modes; a sensor without modes has a single one."""
         return RangingMode(1.0 / self.rate_hz, self.farthest_m)
 
     @property
     def label(self) -> str:
-        """What a skin file calls it."""
+        """Name in skin files."""
         return self.own_name or self.name
 
     @property
     def angle(self) -> float:
-        """Full angle of the cone [rad]; of several zones that of a cone as large as one of them."""
+        """Full angle of the cone [rad]; for zones, that of a cone as large as one of them."""
         side = float(np.deg2rad(self.field_of_view_deg))
         return side if self.zones == 1 else side / self.zones * 2.0 / math.sqrt(math.pi)
 
     @property
     def spread(self) -> float:
-        """Standard deviation of the direction in which a zone's target lies, anywhere in it [rad].
+        """Standard deviation of the direction of a target in its zone [rad].
 
-        0 of a single cone, whose target eq. 1 takes to be on its axis.
+        0 for a single cone: eq. 1 assumes its target on the axis.
         """
         return 0.0 if self.zones == 1 else float(np.deg2rad(self.field_of_view_deg)) / self.zones / math.sqrt(12.0)
 
     def looks(self) -> FloatArray:
-        """Rotations (zones^2, 3, 3) from each zone's frame, z along its beam, to the sensor's.
+        """Return the rotations (zones^2, 3, 3) from each zone's frame, z along its beam, to the sensor's.
 
         Zones are numbered along x, then along y, and lie at equal angles.
         """
         tilt = np.tan(np.deg2rad(self.field_of_view_deg) * ((np.arange(self.zones) + 0.5) / self.zones - 0.5))
         y, x = np.meshgrid(tilt, tilt, indexing="ij")
         beams = np.stack([x.ravel(), y.ravel(), np.ones(self.zones**2)], axis=1)
-        return np.array([_turned(beam / np.linalg.norm(beam)) for beam in beams])
+        return np.array([_rotation_to(beam / np.linalg.norm(beam)) for beam in beams])
 
 
-def _turned(beam: FloatArray) -> FloatArray:
+def _rotation_to(beam: FloatArray) -> FloatArray:
     """Return the least rotation (3, 3) that takes the z axis to a unit vector (3,) of the same half-space."""
     x, y, z = beam.tolist()
     return np.array([
@@ -105,7 +105,7 @@ def _turned(beam: FloatArray) -> FloatArray:
 
 
 _MODES = {"short": RangingMode(period_s=0.02, distance_max_m=1.3), "long": RangingMode(0.14, 4.0)}
-"""50 Hz are to be had in short mode only; four metres need a budget of 140 ms (data sheet DS12385)."""
+"""50 Hz are available in short mode only; four metres need a budget of 140 ms (data sheet DS12385)."""
 
 
 @dataclass(frozen=True)
@@ -122,8 +122,8 @@ class VL53L1X(Sensor, name="vl53l1x"):
 class VL53L5CX(Sensor, name="vl53l5cx"):
     """ST's 4 x 4 zones at 60 Hz (data sheet DS13754: 45 degrees from side to side, 2 cm to 4 m; VL53L8CX likewise).
 
-    `zones = 8` measures 8 x 8 at 15 Hz. The sensor has to be told to report the nearest target of each zone, for by
-    itself it reports the strongest.
+    `zones = 8` measures 8 x 8 at 15 Hz. The sensor must be set to report the nearest target of each zone: its default
+    is the strongest one.
     """
 
     field_of_view_deg: _Angle = 45.0
@@ -138,7 +138,7 @@ class VL53L5CX(Sensor, name="vl53l5cx"):
             raise ParameterError(f"{type(self).__name__}.zones is {self.zones}: it measures 4 x 4 or 8 x 8.")
 
     def ranging(self, mode: str) -> RangingMode:
-        """See `Sensor`; mode short is that of the paper's skins, in which nobody looks farther than it."""
+        """See `Sensor`; mode short is that of the paper's skins, whose range is enough."""
         rate = min(self.rate_hz, _FASTEST_HZ[self.zones])
         return RangingMode(1.0 / rate, min(_GREY_M[self.zones], self.farthest_m))
 
@@ -146,8 +146,8 @@ class VL53L5CX(Sensor, name="vl53l5cx"):
 _FASTEST_HZ = {4: 60.0, 8: 15.0}
 """Most frames a second (data sheet)."""
 _GREY_M = {4: 1.7, 8: 1.2}
-"""Distance at which a grey target that fills a zone is just seen [m]: ours, below what 4 m of a white one in the dark
-allows; to be measured with the sensor in use."""
+"""Distance at which a grey target that fills a zone is just visible [m]: ours, less than the 4 m of a white one in the
+dark imply; to be measured with the sensor in use."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ class Capacitive(Sensor, name="capacitive"):
     """
 
     field_of_view_deg: _Angle = 120.0
-    """Full angle of the cone in which it feels [deg]: ours."""
+    """Full angle of the sensitive cone [deg]: ours."""
     nearest_m: Positive = 0.005
     farthest_m: Positive = 0.18
     rate_hz: Positive = 60.0
@@ -175,24 +175,24 @@ class Capacitive(Sensor, name="capacitive"):
     offset_m: Positive = 0.036
     """About the size of the electrode [m]."""
     power: Positive = 2.58
-    """How fast the signal falls [1]."""
+    """Exponent of the signal's decay [1]."""
     spread_1: Positive = 0.46
-    """Standard deviation of the distance, as a part of it, over what may come [1]."""
+    """Standard deviation of the distance over possible objects, as a part of it [1]."""
 
     def distance(self, signal: float) -> float:
-        """Distance [m] at which what the map was learnt of gives a signal: 0 at the least, infinite without any."""
+        """Return the distance [m] of the map's objects for a signal: at least 0, infinite without a signal."""
         return math.inf if signal <= 0.0 else max(0.0, (self.gain / signal) ** (1.0 / self.power) - self.offset_m)
 
     def signal(self, distance: Number) -> Number:
-        """Signal of what is at a distance [m]."""
+        """Return the signal of an object at a distance [m]."""
         return self.gain / (distance + self.offset_m) ** self.power
 
     @property
     def spread(self) -> float:
-        """As a direction [rad], what two of it take off the distance, as the profiles do.
+        """Error of the distance as a direction [rad], of which profiles subtract two.
 
-        Something at the edge of the field, at half an angle a from the axis, is d cos a high over a flat body, so that
-        two of (1 - cos a) / 2 leave that. What comes may give another signal than what the map was learnt of, too.
+        An object at the edge of the field, at half an angle a from the axis, is d cos a above a flat body: two of
+        (1 - cos a) / 2 cover that. An object may also give another signal than those of the map.
         """
         return math.hypot((1.0 - math.cos(self.angle / 2)) / 2, self.spread_1)
 
@@ -205,30 +205,30 @@ class Sensors(NamedTuple):
     rotation: FloatArray
     """(K, 3, 3), z along the beam."""
     link: IntArray
-    """(K,) link each sits on."""
+    """(K,) link of each."""
 
 
 class Cones(NamedTuple):
-    """What K sensors of T kinds see: a cone about the axis of each."""
+    """Fields of view of K sensors of T kinds: a cone about the axis of each."""
 
     kind: Annotated[IntArray, "K"]
-    """(K,) which kind each is of."""
+    """(K,) kind of each."""
     edge: Annotated[FloatArray, "T", 3]
     """(T, 3) cosine, sine and tangent of half the angle."""
     range: Annotated[FloatArray, "T", 2]
-    """(T, 2) nearest and farthest distance that is measured [m]."""
+    """(T, 2) smallest and largest distance [m]."""
     rays: Annotated[FloatArray, "T", "R", 3]
     """(T, R, 3) unit vectors that fill the cone, sensor frame, the axis first."""
     spread: Annotated[FloatArray, "T"]
-    """(T,) standard deviation of the direction a target lies in, beside what is not known of the unit's own [rad]."""
+    """(T,) standard deviation of a target's direction, without that of the unit's own orientation [rad]."""
 
 
 PAPER_SENSOR = VL53L1X()
-"""What a unit has unless its skin file says otherwise."""
+"""Default sensor of a unit in a skin file."""
 
 
 def cone_rays(rings: int, angle: float) -> FloatArray:
-    """Unit vectors (1 + 3 rings (rings + 1), 3) that fill a cone of a full angle [rad], sensor frame.
+    """Return unit vectors (1 + 3 rings (rings + 1), 3) that fill a cone of a full angle [rad], sensor frame.
 
     The axis comes first, then `rings` circles of 6, 12, ... rays, the outermost on the edge of the cone.
     """
@@ -241,7 +241,7 @@ def cone_rays(rings: int, angle: float) -> FloatArray:
 
 
 def cones_of(sensors: Sequence[Sensor]) -> Cones:
-    """Return what K sensors see, for compiled code."""
+    """Return the fields of view of K sensors, for compiled code."""
     kinds = list(dict.fromkeys(sensors)) or [PAPER_SENSOR]
     half = [kind.angle / 2 for kind in kinds]
     return Cones(
@@ -257,7 +257,7 @@ _LIKE, _OWN = "like", "own_name"
 
 
 def sensor_called(name: Any, of: str, types: dict[str, Sensor]) -> Sensor:
-    """Return the sensor of a type, by its name in a skin file; `of` says what has it, `types` are the file's own."""
+    """Return the sensor of a type by its name; `of` is the owner in messages, `types` are the skin file's own."""
     names = (*types, *Sensor.choices())
     if not isinstance(name, str) or name not in names:
         raise SkinError(f"{of} has the sensor {name!r}: choose from {', '.join(names)}, or describe [sensor.NAME].")
@@ -265,18 +265,18 @@ def sensor_called(name: Any, of: str, types: dict[str, Sensor]) -> Sensor:
 
 
 def own_type(name: str, table: Any) -> Sensor:
-    """Return a type that a skin file describes: a type that is known, and what differs from it."""
+    """Return a type that a skin file describes: a known type, and its differences."""
     of = f"The type [sensor.{name}]" if name.isprintable() else f"The type {name!r}"
     if not isinstance(table, dict):
         raise SkinError(f"{of} is {table!r}: write a table [sensor.NAME].")
     like = sensor_called(table.get(_LIKE, PAPER_SENSOR.name), of, {})
     if name in Sensor.choices():
-        raise SkinError(f"{of} is known by that name already: give yours another, and like = {name!r}.")
+        raise SkinError(f"{of} has the name of a known type: give yours another name, and like = {name!r}.")
     return cast(Sensor, replace(changed_by(like, table, of, _LIKE), own_name=name))
 
 
 def changed_by(usual: Any, table: dict[str, Any], of: str, *others: str) -> Any:
-    """Return parameters with what differs in a table of a skin file, `of` something; the table may have other keys."""
+    """Return parameters changed by a table of a skin file, which may have `others` as keys; `of` is for messages."""
     allowed = [f.name for f in fields(usual) if f.name != _OWN]
     unknown = sorted(set(table) - {*others, *allowed})
     if unknown:
@@ -284,11 +284,11 @@ def changed_by(usual: Any, table: dict[str, Any], of: str, *others: str) -> Any:
     try:
         return replace(usual, **{key: value for key, value in table.items() if key not in others})
     except ParameterError as error:
-        raise SkinError(f"{of} cannot be: {error}") from error
+        raise SkinError(f"{of} is not possible: {error}") from error
 
 
 def tables_of(sensors: Iterable[Sensor]) -> dict[str, dict[str, Any]]:
-    """Return what a skin file says of types that stand in no other place: nothing where all are known by name."""
+    """Return the tables of a skin file for types of its own; none if all types are known by name."""
     tables = {}
     for sensor in sensors:
         if sensor.own_name:

@@ -30,22 +30,22 @@ from pretouch.toml_files import shown, table_of
 from pretouch.types import FloatArray, IntArray
 
 _FAR = 0.5
-"""Distance from its link beyond which a unit cannot be mounted on it [m]: millimetres taken for metres, most likely."""
+"""Largest distance of a unit from its link [m]: beyond it, millimetres in place of metres are likely."""
 
 _MOST_UNITS = 2048
-"""Units and zones on one arm, 32 units of 8 x 8: what a step and a model's check take grows with their number."""
+"""Units and zones on one arm, at most, as 32 units of 8 x 8: the time of a step and of the checks grows with them."""
 
 PAPER_SKIN = Path(str(files("pretouch.sensing") / "data" / "panda_seven_units.toml"))
 """The file of `paper_skin` for the Panda."""
 LIVE_SKIN = PAPER_SKIN.with_name("panda_live.toml")
-"""34 units for the Panda of the live page, where people put their hands; the FR3 has the same."""
+"""34 units for the Panda of the live page, at the places that people touch; the FR3 has the same."""
 
 
 class SkinArrays(NamedTuple):
     """The K units of a `Skin`."""
 
     link: Annotated[IntArray, "K"]
-    """(K,) link each sits on."""
+    """(K,) link of each."""
     T_link_sensor: Annotated[FloatArray, "K", 4, 4]
     """(K, 4, 4)."""
     position_sigma: Annotated[FloatArray, "K"]
@@ -53,13 +53,13 @@ class SkinArrays(NamedTuple):
     orientation_sigma: Annotated[FloatArray, "K"]
     """(K,) standard deviation of its orientation [rad]."""
     cones: Cones
-    """What each sees."""
+    """Field of view of each."""
 
 
 class Skin:
     """K sensor units on an arm, checked against its model. The order of the units is the order of all readings.
 
-    Each zone of a sensor that has several counts as a unit of its own, which looks along the zone's beam.
+    Each of several zones of a sensor counts as a unit of its own, along the zone's beam.
 
     Raises SkinError for too many units, duplicate ids, a link the arm does not have, and a unit inside its own link or
     far off it.
@@ -77,15 +77,15 @@ class Skin:
             _check_place(unit, model)
         self.ids: tuple[str, ...] = tuple(ids)
         self.boards: tuple[str, ...] = tuple(unit.board for unit in self.units)
-        """(K,) id of the mounted unit each belongs to: its own, but for zones."""
+        """(K,) id of the mounted unit of each: its own, except for zones."""
         self.mounted = tuple(units)
-        """The B units as they are mounted: those with zones whole."""
+        """The B mounted units; zones are not separate."""
         self.first: IntArray = np.array([k for k, unit in enumerate(self.units) if not unit.zone], dtype=np.int64)
         """(B,) index of each one's first zone, or its own."""
         self.board: IntArray = np.cumsum([not unit.zone for unit in self.units], dtype=np.int64) - 1
-        """(K,) index of the mounted unit each belongs to."""
+        """(K,) index of the mounted unit of each."""
         self.network = NetworkUnits(tuple(u.id for u in self.mounted), tuple(u.sensor.zones for u in self.mounted))
-        """The same units as they speak over the network."""
+        """The same units on the network."""
         self.arrays = SkinArrays(
             np.array([model.link_index(u.link) for u in self.units], dtype=np.int64),
             np.array([u.T_link_sensor for u in self.units]).reshape(-1, 4, 4),
@@ -96,9 +96,9 @@ class Skin:
         """The same for compiled code."""
         self.link, self.T_link_sensor, position_sigma, orientation_sigma, self.cones = self.arrays
         self.exact = not (position_sigma.any() or orientation_sigma.any() or self.cones.spread.any())
-        """Whether the place of every unit is taken as exact, and that of what it sees."""
+        """True if the poses of all units are exact, and the directions of their targets."""
         self.T_link_board: FloatArray = np.array([u.T_link_sensor for u in self.mounted]).reshape(-1, 4, 4)[self.board]
-        """(K, 4, 4) pose of the mounted unit each belongs to: the IMU's."""
+        """(K, 4, 4) pose of the mounted unit of each: the IMU's."""
         self.touching: IntArray = np.array([k for k, u in enumerate(self.units) if u.touch is not None], dtype=np.int64)
         """(M,) indices of the units with a touch sensor."""
 
@@ -127,7 +127,7 @@ def _check_place(unit: SensorUnit, model: RobotModel) -> None:
 
 
 def load_skin(path: Path | str, model: RobotModel) -> Skin:
-    """Read a skin file. What is wrong with it is a SkinError that names the file and the unit, and the way out."""
+    """Read a skin file. A mistake in it is a SkinError that names the file and the unit, and the way out."""
     path, place = Path(path), ""
     data = table_of(path, "skin file", SkinError)
     entries, tables = data.get("unit"), data.get("sensor", {})
@@ -149,10 +149,10 @@ def load_skin(path: Path | str, model: RobotModel) -> Skin:
 
 
 def save_skin(skin: Skin, path: Path) -> None:
-    """Write a skin file that `load_skin` reads back to the same poses and uncertainties.
+    """Write a skin file from which `load_skin` reads the same poses and uncertainties.
 
-    A file that is there is replaced whole or, with a SkinError, not at all. Where the path is a symbolic link, the file
-    it leads to is replaced.
+    An existing file is replaced as a whole or, with a SkinError, not at all. For a symbolic link, the file behind it is
+    replaced.
     """
     try:
         units = {"unit": [_entry(unit) for unit in skin.mounted]}
@@ -185,16 +185,16 @@ OWN_SKIN = "skin.toml"
 
 
 def skin_file(arm: RobotDescription) -> Path:
-    """Return the file of the skin that an arm comes with; SkinError where there is none.
+    """Return the file of an arm's own skin; SkinError if there is none.
 
-    That is skin.toml beside its model, or else, for Panda and FR3, that of `paper_skin`.
+    That is skin.toml beside its model, or, for Panda and FR3, that of `paper_skin`.
     """
     own = arm.mjcf.with_name(OWN_SKIN)
     return own if own.is_file() else _seven_units(arm)
 
 
 def skin_for(model: RobotModel, file: Path | str | None = None) -> Skin:
-    """Return the skin of a file, or without one the skin that the arm comes with."""
+    """Return the skin of a file, or without one the arm's own skin."""
     return load_skin(file or skin_file(model.description), model)
 
 
@@ -204,13 +204,13 @@ class _UnitTable(Struct, forbid_unknown_fields=True):
     id: str
     link: str
     position_m: tuple[float, float, float]
-    """From the link's origin [m]."""
+    """Position from the link's origin [m]."""
     quaternion_wxyz: tuple[float, float, float, float]
-    """Of the sensor's axes in the link's."""
+    """Orientation of the sensor's axes in the link's."""
     position_sigma_m: float = 0.0
     orientation_sigma_rad: float = 0.0
     touch: bool | dict[str, Any] = False
-    """True for the usual touch sensor, or what differs from it."""
+    """True for the usual touch sensor, or the differences from it."""
     sensor: Any = PAPER_SENSOR.label
     """Name of its type."""
 
@@ -226,11 +226,11 @@ def _entry(unit: SensorUnit) -> dict[str, Any]:
 
 
 def sensor_unit(**entry: Any) -> SensorUnit:
-    """Return a unit from what stands of it in a skin file; wrong or unknown values are a SkinError.
+    """Return a unit from its values in a skin file; wrong or unknown values are a SkinError.
 
     Args:
         entry: `id`, `link`, `position_m` (3,) [m] from the link's origin, `quaternion_wxyz` (4,) of the sensor's axes
-            in the link's, and, where they are known, `position_sigma_m` [m], `orientation_sigma_rad` [rad], `touch`
+            in the link's, and, if known, `position_sigma_m` [m], `orientation_sigma_rad` [rad], `touch`
             (true, or its values) and `sensor` (the name of a type).
     """
     arrays = ("position_m", "quaternion_wxyz")
@@ -254,10 +254,11 @@ def _unit_from(entry: Any, types: dict[str, Sensor]) -> SensorUnit:
     T[:3, :3], T[:3, 3] = _rotation(*table.quaternion_wxyz), table.position_m
     touch = changed_by(TouchPatch(), table.touch, f"{name}: touch") if isinstance(table.touch, dict) else None
     sensor = sensor_called(table.sensor, name, types)
-    return SensorUnit(
-        table.id, table.link, T, table.position_sigma_m, table.orientation_sigma_rad,
-        TouchPatch() if table.touch is True else touch, sensor,
-    )  # fmt: skip
+    touch, sigmas = (
+        TouchPatch() if table.touch is True else touch,
+        (table.position_sigma_m, table.orientation_sigma_rad),
+    )
+    return SensorUnit(table.id, table.link, T, *sigmas, touch, sensor)
 
 
 def _rotation(w: float, x: float, y: float, z: float) -> FloatArray:

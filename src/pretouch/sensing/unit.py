@@ -1,4 +1,4 @@
-"""One sensor unit: a range finder at a known place on a link, of one beam or of zones; its traffic, and its IMU."""
+"""A sensor unit: a range finder with a pose on a link, with one beam or zones; its network identity, and its IMU."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -15,13 +15,13 @@ from pretouch.sensing.sensor import PAPER_SENSOR, Sensor
 from pretouch.types import FloatArray
 
 LARGEST_NUMBER = 1000.0
-"""Largest number a pose may hold: any larger one is a mistake, and its square may not be finite."""
+"""Largest number in a pose: a larger one is a mistake, and its square may not be finite."""
 
 LARGEST_POSITION_SIGMA = 0.5
-"""Largest standard deviation of a unit's position [m]: beyond it nothing is known of where on the arm it is."""
+"""Largest standard deviation of a unit's position [m]: beyond it the place on the arm is unknown."""
 
 LARGEST_ORIENTATION_SIGMA = np.pi / 2
-"""Largest standard deviation of a unit's orientation [rad]: beyond it nothing is known of where it looks."""
+"""Largest standard deviation of a unit's orientation [rad]: beyond it the direction is unknown."""
 
 
 @dataclass(frozen=True)
@@ -33,11 +33,11 @@ class TouchPatch(Checked):
     """
 
     radius_m: Annotated[float, Check(0.0, 0.2, open_low=True)] = 0.02
-    """Radius of the patch [m]: a larger one says nothing of where."""
+    """Radius of the patch [m]: a touch of a larger one has no place."""
     force_min_n: Annotated[float, Check(0.0, 100.0, open_low=True)] = 0.5
     """Smallest force that counts as a touch [N]: beyond 100 N a person is hurt before."""
     measures_force: bool = True
-    """Whether it tells the size of the force, or contact only."""
+    """True if it measures the size of the force, False for contact only."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,15 +52,15 @@ class SensorUnit:
     T_link_sensor: FloatArray
     """(4, 4) maps sensor coordinates to link coordinates [m]."""
     position_sigma: float = 0.0
-    """Standard deviation of its position in the worst direction [m]; 0 takes it as exact."""
+    """Standard deviation of its position in the worst direction [m]; 0: exact."""
     orientation_sigma: float = 0.0
-    """Standard deviation of its orientation about the worst axis [rad]; 0 takes it as exact."""
+    """Standard deviation of its orientation about the worst axis [rad]; 0: exact."""
     touch: TouchPatch | None = None
-    """Its touch sensor, if it has one."""
+    """Its touch sensor; None without one."""
     sensor: Sensor = PAPER_SENSOR
     """Its range finder."""
     zone: int | None = None
-    """Which zone of its sensor this is, which then looks along the zone's beam; None for the whole unit."""
+    """Number of a zone of its sensor, whose beam is then the z axis; None for the whole unit."""
 
     def __post_init__(self) -> None:
         if not self.id:
@@ -96,16 +96,16 @@ class SensorUnit:
 
     @property
     def board(self) -> str:
-        """The id of the unit that this is, or is a zone of."""
+        """Id of this unit, or of the unit of this zone."""
         return self.id if self.zone is None else self.id.rpartition(_OF)[0]
 
 
 _OF = "/"
-"""Between the id of a unit and the number of a zone."""
+"""Separator of the id of a unit and the number of a zone."""
 
 
 def zones_of(unit: SensorUnit) -> tuple[SensorUnit, ...]:
-    """Return what measures a distance each: a whole unit, or its zones; the first has the unit's touch sensor."""
+    """Return the parts with one distance each: a whole unit, or its zones; the first has the unit's touch sensor."""
     if unit.zone is not None:
         raise SkinError(f"Unit {unit.id} is a zone: give the whole unit, of `Skin.mounted`.")
     if unit.sensor.zones == 1:
@@ -124,13 +124,13 @@ class Seat:
     """A point of the surface of a link, below a unit."""
 
     height: float
-    """Of the unit above it [m]; negative inside."""
+    """Height of the unit above it [m]; negative inside."""
     normal: FloatArray
     """(3,) unit vector outwards, link frame."""
 
 
 def seat(model: RobotModel, link: int, p: FloatArray) -> Seat | None:
-    """Return where the surface of a link is nearest to a point p (3,) in its frame [m]; None if it has no capsule."""
+    """Return the nearest point of a link's surface to a point p (3,) in its frame [m]; None without a capsule."""
     own = model.capsules.of_links(np.array([link]))
     if not len(own.radius):
         return None
@@ -142,16 +142,16 @@ def seat(model: RobotModel, link: int, p: FloatArray) -> Seat | None:
 
 @dataclass(frozen=True)
 class NetworkUnits:
-    """B units in the order of the skin. What units measure has K rows, one for each zone (`Skin`)."""
+    """B units in the order of the skin. Their measurements have K rows, one for each zone (`Skin`)."""
 
     ids: tuple[str, ...]
-    """Their names: those of keys and traffic."""
+    """Names of the units, in keys and datagrams."""
     zones: tuple[int, ...]
     """Zones along each side of each one's sensor; 1: a single range."""
 
     @classmethod
     def of(cls, units: "NetworkUnits | Iterable[str]") -> "NetworkUnits":
-        """Return units as they are, or those of these names, none of which has zones."""
+        """Return units as they are, or units without zones for names."""
         if isinstance(units, NetworkUnits):
             return units
         ids = tuple(units)
@@ -159,17 +159,17 @@ class NetworkUnits:
 
     @property
     def first(self) -> tuple[int, ...]:
-        """Row of each one's range, or of its first zone's; touch and IMU are told there too."""
+        """Row of each unit's range, or of its first zone's; touch and IMU have the same row."""
         return tuple(accumulate((side**2 for side in self.zones[:-1]), initial=0))[: len(self.ids)]
 
     @property
     def rows(self) -> int:
-        """K."""
+        """Number of rows K."""
         return sum(side**2 for side in self.zones)
 
 
 STANDARD_GRAVITY = 9.80665
-"""Of the LSM6DS3, the inertial sensor of a unit [m/s^2]; the data sheet gives accelerations in its thousandths."""
+"""Unit of the LSM6DS3, the inertial sensor of a unit [m/s^2]: its data sheet gives accelerations in thousandths."""
 ACCELERATION_LSB = {g: 1e-3 * mg * STANDARD_GRAVITY for g, mg in ((2, 0.061), (4, 0.122), (8, 0.244), (16, 0.488))}
 """One count of the accelerometer [m/s^2] by its full scale [g] (data sheet, LA_So)."""
 ANGULAR_RATE_LSB = {
@@ -178,7 +178,7 @@ ANGULAR_RATE_LSB = {
 }
 """One count of the gyroscope [rad/s] by its full scale [degrees/s] (data sheet, G_So)."""
 LARGEST_COUNT = 2**15 - 1
-"""Where counts end, whatever the full scale is called."""
+"""Largest count, for any nominal full scale."""
 
 
 def counts_of(scale: int) -> tuple[float, float]:

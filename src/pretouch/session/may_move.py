@@ -8,7 +8,7 @@ import numpy as np
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.controller import Controller
 from pretouch.errors import RobotError
-from pretouch.ports import Arm, Clock, Robot, Skin
+from pretouch.ports import Arm, Clock, Robot, SkinPort
 from pretouch.sound import sound_robot
 from pretouch.types import FloatArray, RobotState
 from pretouch.units.findings import Finding
@@ -271,7 +271,7 @@ class StandingArm:
     """An arm that stands, and what is to move it."""
 
     arm: Arm
-    skin: Skin
+    skin: SkinPort
     """Its units: their health is judged where it is a `NetworkSkin`."""
     controller: Controller
     floor: float

@@ -17,7 +17,7 @@ from pretouch.control.path import Path as ArmPath
 from pretouch.controller import Controller
 from pretouch.errors import CalibrationError, ExperimentError, HardwareError, PretouchError, RobotError
 from pretouch.loop import Cycle, MonotonicClock, Recorder
-from pretouch.ports import Arm, NoUnits, Skin
+from pretouch.ports import Arm, NoUnits, SkinPort
 from pretouch.recording.writer import LastSeconds, Recording
 from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import brought_to
@@ -195,7 +195,7 @@ def execute(
     seconds: float,
     recorder: Recorder,
     clock: MonotonicClock,
-    options: realtime.Options,
+    options: realtime.RealTimeOptions,
     ending: Ending,
 ) -> None:
     """Let an arm that was checked move: to the start of its path, if there is a way to go, then under its controller.
@@ -225,7 +225,7 @@ def execute(
 class _Until:
     """Condition that ends a run."""
 
-    def __init__(self, seconds: float, skin: Skin) -> None:
+    def __init__(self, seconds: float, skin: SkinPort) -> None:
         self._seconds, self._units = seconds, skin if isinstance(skin, NetworkSkin) else None
         self._begin, self._steps = 0.0, 0
 
@@ -273,7 +273,7 @@ def follow(
     clock: MonotonicClock,
     recorder: Recorder,
     done: Callable[[ControlStep], bool],
-    options: realtime.Options,
+    options: realtime.RealTimeOptions,
     ending: Ending,
 ) -> None:
     """Turn the controller until `done` says so, a signal comes, or something fails. The arguments are `realtime.run`'s.

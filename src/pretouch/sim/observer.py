@@ -10,7 +10,7 @@ import numpy as np
 
 from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled
-from pretouch.robot.kinematics import Arm, Hinges, Kinematics, jacobian_into, place
+from pretouch.robot.kinematics import ArmTopology, Hinges, Kinematics, jacobian_into, place
 from pretouch.types import FloatArray
 
 
@@ -71,7 +71,7 @@ def observe(
 
 @compiled
 def wrench_from_torques(
-    hinges: Hinges, arm: Arm, q: FloatArray, tau_ext: FloatArray, damping: float, smallest_singular_value: float
+    hinges: Hinges, arm: ArmTopology, q: FloatArray, tau_ext: FloatArray, damping: float, smallest_singular_value: float
 ) -> FloatArray | None:
     """Wrench (6,) at the end-effector [N, Nm] that explains external joint torques, by damped least squares.
 

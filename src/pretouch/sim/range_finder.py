@@ -82,7 +82,7 @@ class RangeSample(NamedTuple):
 
 
 class RangeFinders:
-    """All sensors of a skin in a simulated room: the port `Skin`, sampled and held.
+    """All sensors of a skin in a simulated room: the port `SkinPort`, sampled and held.
 
     Each unit measures at its own phase and rate, all of its zones at once; a reading arrives late, out of step with
     the others, or not at all. A unit sees everything but its own link: objects, hand, floor, and the rest of the arm.

@@ -4,7 +4,7 @@ from collections import deque
 
 import numpy as np
 
-from pretouch.perception.obstacles import measured, placed_sensors, tells_anything
+from pretouch.perception.obstacles import is_informative, measured, placed_sensors
 from pretouch.perception.scene_filter import Fixtures, bounds, nearest_capsule, plane_return
 from pretouch.robot.body import placed
 from pretouch.robot.model import RobotModel
@@ -47,7 +47,7 @@ class ModelCheck:
         fresh = readings.stamp > self._used
         self._used = np.maximum(self._used, readings.stamp)
         distance = measured(readings.distance, readings.status, self._skin.cones)
-        fresh &= tells_anything(readings.distance, readings.status, distance, self._skin.cones)
+        fresh &= is_informative(readings.distance, readings.status, distance, self._skin.cones)
         if not fresh.any():
             return
         farthest = self._certain_return(q, fresh)

@@ -1,4 +1,4 @@
-"""The port `Skin` over the network: the receiver in a process of its own, the newest values in shared memory.
+"""The port `SkinPort` over the network: the receiver in a process of its own, the newest values in shared memory.
 
 A flood, a slow disk or a garbage collection in one process does not stop the other. If the receiver's process dies,
 readings grow old, which the controller names as silence. If the program that started it dies, it ends too, and the

@@ -61,15 +61,17 @@ def trial(seed: int, roughly: bool = False) -> list[Row]:
     """Identify an arm; a row for each number that the recording tells."""
     samples, plant = swung(seed)
     arm = identify(rough(samples, seed) if roughly else samples, RobotModel(panda()), PlantParams())
-    truth, noise = plant.params, arm.noise
+    truth = plant.params
     f1 = (1.0 - truth.friction_compensated) * np.array(truth.friction_f1_nm)
     true = {field: getattr(truth, field, None) for field in (quantity.field for quantity in arm.of_joints())}
     true |= {"offsets_nm": plant.offset_nm, "friction_f1_nm": f1, "ripple_phases_rad": None}
     numbers = [
         ("payload [kg]", *arm.fit.payload, plant.error.payload),
         ("observer gain [1/s]", arm.fit.gain, float(arm.fit.errors[-1]), truth.observer_gain_1_s),
-        ("velocity noise [rad/s]", noise.velocity_rad_s, noise.velocity_error_rad_s, truth.velocity_noise_rad_s),
     ]
+    if noise := arm.noise:
+        velocity = noise.velocity_rad_s, noise.velocity_error_rad_s, truth.velocity_noise_rad_s
+        numbers.append(("velocity noise [rad/s]", *velocity))
     for quantity in arm.of_joints():
         if (right := true[quantity.field]) is not None:
             every = zip(quantity.values, quantity.standard_errors, np.asarray(right), strict=True)

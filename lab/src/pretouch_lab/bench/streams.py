@@ -95,7 +95,7 @@ class StreamRecorder:
         begin, end = (memory.places[f"watch.robot.{name}"].at for name in ("stamp", "wrench"))
         robot = memory.blocks[0][begin.start : end.stop].copy()
         reacting = cycle.before.mode.mode is Mode.REACT
-        self.add(robot, cycle.step.obstacles, cycle.step.stamp, memory.get("tracks.heard"), reacting)
+        self.add(robot, cycle.step.obstacles, cycle.step.stamp, memory.get("tracks.report_stamp"), reacting)
         if self._look:
             self._look(cycle)
 
@@ -209,6 +209,6 @@ def record_moved(what: Alone, prepare: Prepare, command: Callable[[float, FloatA
                 now.put(f"robot.{name}", getattr(state, name))
             now.put("stamp", stamp)
             controller.take(memory, now, controller.beside, SEE, SEE)
-            near, heard = ControlStep.of(now, CLEAR).obstacles, memory.get("tracks.heard")
+            near, heard = ControlStep.of(now, CLEAR).obstacles, memory.get("tracks.report_stamp")
         recorder.add(np.concatenate(((state.stamp,), *parts)), near, stamp, heard)
     return recorder.stream()

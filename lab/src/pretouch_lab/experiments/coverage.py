@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.coverage.measure import Setting
+from pretouch.coverage.measure import CoverageSetting
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import candidates, suggest
 from pretouch.coverage.ways import seen_by, ways_to
@@ -119,7 +119,7 @@ def cells(options: Options) -> list[Row]:
 @lru_cache(maxsize=4)
 def _places(model: RobotModel, skin: Skin) -> tuple[tuple[SensorUnit, ...], tuple[SensorUnit, ...]]:
     """Return all places for units, and those of them that help most on the circle."""
-    ways = Setting(model, fixtures(SceneSpec()), CoverageParams(), "circle", _POSTURES).ways()
+    ways = CoverageSetting(model, fixtures(SceneSpec()), CoverageParams(), "circle", _POSTURES).ways()
     places = candidates(ways, skin)
     return places, suggest((ways,), skin, MORE, places).units
 

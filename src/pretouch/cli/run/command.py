@@ -18,7 +18,7 @@ from pretouch.cli.warm_up import prepare
 from pretouch.cli.writing import check_writable, numbers_to
 from pretouch.errors import HardwareError, ParameterError, RecordingError, RobotError
 from pretouch.loop import MonotonicClock
-from pretouch.realtime import Options, check_wishes
+from pretouch.realtime import RealTimeOptions, check_wishes
 from pretouch.session.may_move import StandingArm, Standstill, refusals, vector
 from pretouch.session.memory import ConfirmedRobots, FreeMotion, state_folder
 from pretouch.session.progress import ProgressReporter
@@ -205,7 +205,7 @@ def _executed(
         opening = open_run_files(standing, command.record, Path(command.holds), tell, learnt, output)
         files = stack.enter_context(opening)
         reporter = ProgressReporter(files, tell, latched, controller)
-        options = Options(
+        options = RealTimeOptions(
             enter,
             learnt.begin if learnt else None,
             desired=opened.commander or (lambda: None),

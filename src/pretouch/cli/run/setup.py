@@ -15,8 +15,7 @@ from pretouch.control.path import Circle, Path, WayPoints, segment
 from pretouch.controller import Controller
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.perception.scene_filter import floor_and_pedestal
-from pretouch.ports import NoUnits
-from pretouch.ports import Skin as SkinPort
+from pretouch.ports import NoUnits, SkinPort
 from pretouch.profiles import Profile
 from pretouch.profiles import profile as find_profile
 from pretouch.robot.description import robot_named
