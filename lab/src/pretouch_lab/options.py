@@ -108,7 +108,7 @@ class InWorlds(Published):
 class Detection(InWorlds):
     """Hold contact detectors against each other: delay against false alarms, what they miss, forces on a board.
 
-    About an hour on two processors, with --quick five minutes. A run that was stopped goes on with the same --out.
+    About half an hour on two processors, with --quick two minutes. A run that was stopped goes on with the same --out.
     """
 
 
@@ -149,8 +149,7 @@ class Shield(Published):
 class Both(InWorlds):
     """Run the benchmarks detection and avoidance, and say which goals were reached.
 
-    About an hour and a half on two processors, with --quick ten minutes. A run that was stopped goes on with the same
-    --out.
+    About 40 minutes on two processors, with --quick three minutes. A run that was stopped goes on with the same --out.
     """
 
 

@@ -29,7 +29,7 @@ from pretouch_lab.bench.detection_results import delays, rate, results
 from pretouch_lab.bench.detection_tables import reached, tables
 from pretouch_lab.bench.free import free_stream
 from pretouch_lab.bench.replays import REST, Steps, alarms_of, begun
-from pretouch_lab.bench.scenes import Arm, model
+from pretouch_lab.bench.scenes import ArmCell, model
 from pretouch_lab.bench.streams import AWAY, StreamRecorder
 from pretouch_lab.replay import DetectorAlone, FirstMotion, Ghost
 
@@ -266,15 +266,16 @@ def test_every_baseline_is_a_profile_with_its_own_value_on_its_curve():
     every = (*DETECTORS, *ablated())
     assert len({baseline.name for baseline in every}) == len(every)
     for baseline in every:
-        assert baseline.default in sweep_values(baseline)
+        own = baseline.profile.detect.f_base_n if baseline.sweep == "f_base_n" else 1.0
+        assert own in sweep_values(baseline)
 
 
 def test_a_run_leaves_rows_for_every_detector(monkeypatch):
     for module in (detection, free_motion):
         monkeypatch.setattr(module, "warm_up_s", lambda: 1.5)
     monkeypatch.setattr(contacts, "plan", lambda *_: [touching(1.8)])
-    free = Arm("free", sensing="seven", speed_m_s=0.3, near="standing", counted_s=1.0, ablated=True)
-    pushed = Arm("contacts", sensing="seven", speed_m_s=0.3, near="touched", count=1)
+    free = ArmCell("free", sensing="seven", speed_m_s=0.3, near="standing", counted_s=1.0, ablated=True)
+    pushed = ArmCell("contacts", sensing="seven", speed_m_s=0.3, near="touched", count=1)
     rows = rows_of([cell | trial(cell, 1000) for cell in (asdict(pushed), asdict(free))])
     assert [row["family"] for row in rows[:2]] == ["free", "free"]
     assert len(rows) == 2 * len(DETECTORS) + len(ablated())  # the contacts are not those that ablations are given
@@ -291,7 +292,7 @@ def test_a_run_leaves_rows_for_every_detector(monkeypatch):
 
 
 def test_arms_that_nobody_is_near_move_alike_without_units(monkeypatch):
-    free = Arm("free", sensing="seven", speed_m_s=0.3, counted_s=1.0)
+    free = ArmCell("free", sensing="seven", speed_m_s=0.3, counted_s=1.0)
     monkeypatch.setattr(free_motion, "warm_up_s", lambda: 0.0)
     made = free_stream(free, 1000)
     monkeypatch.setattr(free_motion, "_bystander", lambda *_: lambda _: AWAY)

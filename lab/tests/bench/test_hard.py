@@ -14,7 +14,7 @@ from pretouch_lab.bench.detection import plays
 from pretouch_lab.bench.detection_results import HARD, UNTOLD, arms_of, hard_rows
 from pretouch_lab.bench.hard import hard_stream
 from pretouch_lab.bench.motions import motion_of
-from pretouch_lab.bench.scenes import Arm, model, scenario
+from pretouch_lab.bench.scenes import ArmCell, model, scenario
 from pretouch_lab.bench.streams import record
 
 
@@ -52,7 +52,7 @@ def test_a_hard_motion_is_within_the_limits_and_as_fast_as_it_says(name):
 
 @pytest.mark.slow
 def test_a_hard_arm_moves_and_sees_without_a_controller_as_with_one(monkeypatch):
-    arm = Arm("hard", path="pick-and-place", near="standing", counted_s=1.0)
+    arm = ArmCell("hard", path="pick-and-place", near="standing", counted_s=1.0)
     (made, _), (alone, _) = hard_stream(arm, 1003), hard_stream(replace(arm, near="nothing"), 1003)
     assert made.stamp[-1] == pytest.approx(61.0, abs=0.05)
 

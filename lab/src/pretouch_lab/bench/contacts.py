@@ -10,7 +10,7 @@ from pretouch.robot.postures import brought_to
 from pretouch.sim.plant import Plant, PointForce
 from pretouch.types import FloatArray
 from pretouch_lab.bench.dense_skin import gap, surface
-from pretouch_lab.bench.scenes import Arm, model, path_of, plant_of, scenario, sensing_of
+from pretouch_lab.bench.scenes import ArmCell, model, path_of, plant_of, scenario, sensing_of
 from pretouch_lab.bench.streams import AWAY, Alone, Stream, record
 
 _TRIES = 400
@@ -158,7 +158,7 @@ class Toucher:
         return np.asarray(origin + rotation @ (touch.point + (touch.hand_radius + off) * touch.normal))
 
 
-def contact_stream(arm: Arm, seed: int) -> tuple[Stream, list[Touching]]:
+def contact_stream(arm: ArmCell, seed: int) -> tuple[Stream, list[Touching]]:
     """Let an arm be touched; return its stream and its contacts."""
     sensing = sensing_of(arm.sensing, seed)
     touches = plan(arm.count, sensing.hand_radius, seed)

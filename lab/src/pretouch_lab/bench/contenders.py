@@ -109,11 +109,6 @@ class Contender:
         """Return its parameters."""
         return profile(self.profile_text)
 
-    @property
-    def default(self) -> float:
-        """Return the value of the sweep that the profile itself has."""
-        return MovingThresholds.of_kind(self.profile.detect).f_base_n if self.sweep == "f_base_n" else 1.0
-
     def statistic(self, found: Detection, filtered: FloatArray, wrench: FloatArray | None) -> float:
         """Return the largest value of the sweep at which a step would still be an alarm; -inf where none would.
 

@@ -16,7 +16,7 @@ from pretouch_lab.bench.contenders import DETECTORS, Contender, ablated
 from pretouch_lab.bench.free import free_stream, warm_up_s
 from pretouch_lab.bench.hard import hard_stream
 from pretouch_lab.bench.replays import PERIOD_S, REST, Replayed, Steps, alarms_of
-from pretouch_lab.bench.scenes import Arm, SeedRange, model, numbered, scenario
+from pretouch_lab.bench.scenes import ArmCell, SeedRange, model, numbered, scenario
 from pretouch_lab.bench.streams import Stream
 from pretouch_lab.run import Cell, Play, Row
 from pretouch_lab.table import rounded
@@ -38,7 +38,7 @@ def plays(seeds: SeedRange, quick: bool, world: str = "") -> list[Play]:
     return [(asdict(arm), seed) for arm, seed in arms]
 
 
-def _free(seeds: SeedRange, quick: bool, world: str) -> Iterator[tuple[Arm, int]]:
+def _free(seeds: SeedRange, quick: bool, world: str) -> Iterator[tuple[ArmCell, int]]:
     family, goal, entries = scenario("free"), scenario("contacts")["goal"], Counter[int]()
     counted = family["duration"]["quick_s" if quick else "full_s"]
     for entry, seed in numbered(family, family["arm"], seeds, quick):
@@ -46,32 +46,35 @@ def _free(seeds: SeedRange, quick: bool, world: str) -> Iterator[tuple[Arm, int]
         usual = entry["kind"] == "nominal" and entry["speed_m_s"] == goal["speed_m_s"]
         ablated = usual and entries[id(entry)] <= ABLATED_ARMS
         where = {name: entry[name] for name in ("kind", "path", "speed_m_s", "near")}
-        yield Arm("free", **where, sensing="seven", counted_s=counted, ablated=ablated, world=world), seed
+        yield ArmCell("free", **where, sensing="seven", counted_s=counted, ablated=ablated, world=world), seed
 
 
-def _contacts(seeds: SeedRange, quick: bool, world: str) -> Iterator[tuple[Arm, int]]:
+def _contacts(seeds: SeedRange, quick: bool, world: str) -> Iterator[tuple[ArmCell, int]]:
     family = scenario("contacts")
     count = family["contact"]["quick" if quick else "full"]
     for entry, seed in numbered(family, family["cell"], seeds, quick):
         kind, sensing, speed = entry["kind"], entry["sensing"], entry["speed_m_s"]
         ablated = (kind, sensing, speed) == ("nominal", "nominal", family["goal"]["speed_m_s"])
         path = "circle" if speed > 0 else "rest"
-        yield Arm("contacts", kind, sensing, path, speed, "touched", count=count, ablated=ablated, world=world), seed
+        yield (
+            ArmCell("contacts", kind, sensing, path, speed, "touched", count=count, ablated=ablated, world=world),
+            seed,
+        )
 
 
-def _hard(seeds: SeedRange, quick: bool) -> Iterator[tuple[Arm, int]]:
+def _hard(seeds: SeedRange, quick: bool) -> Iterator[tuple[ArmCell, int]]:
     family, size = scenario("hard"), "quick" if quick else "full"
     counted, count = family["duration"][f"{size}_s"], family["contact"][size]
     spent = float(count * (np.mean(family["contact"]["gap_s"]) + np.mean(family["contact"]["durations_s"])))
     entries = [*family["cell"], *({**entry, "near": "touched"} for entry in family["touched"])]
     for entry, seed in numbered(family, entries, seeds, quick):
-        touched, arm = entry["near"] == "touched", Arm("hard", path=entry["motion"], near=entry["near"])
+        touched, arm = entry["near"] == "touched", ArmCell("hard", path=entry["motion"], near=entry["near"])
         yield replace(arm, counted_s=spent if touched else counted, count=count if touched else 0), seed
 
 
 def trial(cell: Cell, seed: int) -> Row:
     """Simulate an arm, and give what it said to one detector after the other."""
-    arm = Arm(**cell)
+    arm = ArmCell(**cell)
     stream, touches = streamed(arm, seed)
     steps = Steps(stream, model())
 
@@ -88,7 +91,7 @@ def rows_of(played: list[Row]) -> list[Row]:
     return [{**row, **one} for row in ordered for one in row["detectors"]]
 
 
-def streamed(arm: Arm, seed: int) -> tuple[Stream, list[Touching]]:
+def streamed(arm: ArmCell, seed: int) -> tuple[Stream, list[Touching]]:
     """Let an arm run, and return its stream and its contacts, none where it is not touched."""
     if arm.family == "free":
         return free_stream(arm, seed), []

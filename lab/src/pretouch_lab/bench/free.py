@@ -3,7 +3,7 @@
 import numpy as np
 
 from pretouch.types import FloatArray
-from pretouch_lab.bench.scenes import Arm, path_of, plant_of, scenario, sensing_of
+from pretouch_lab.bench.scenes import ArmCell, path_of, plant_of, scenario, sensing_of
 from pretouch_lab.bench.streams import AWAY, Alone, Prepare, Stream, record
 
 _HAND_SIDE_M = 0.102
@@ -17,7 +17,7 @@ def warm_up_s() -> float:
     return float(scenario("free")["duration"]["warm_up_s"])
 
 
-def free_stream(arm: Arm, seed: int) -> Stream:
+def free_stream(arm: ArmCell, seed: int) -> Stream:
     """Let an arm move that nothing touches, with its skin where somebody is near; return its stream."""
     what = Alone(
         path_of(arm.path), arm.speed_m_s, plant_of(arm.kind),
@@ -27,7 +27,7 @@ def free_stream(arm: Arm, seed: int) -> Stream:
     return record(what, _bystander(arm, seed))
 
 
-def _bystander(arm: Arm, seed: int) -> Prepare:
+def _bystander(arm: ArmCell, seed: int) -> Prepare:
     """Return what has somebody stand beside the path, or come and go there; the seed says where."""
     near, rng = scenario("free")["near"], np.random.default_rng([seed, 31])
     closest = rng.uniform(*near["gap_m"])

@@ -12,7 +12,7 @@ from pretouch.types import FloatArray
 from pretouch_lab.bench.contacts import Toucher, Touching, last_s, place_on
 from pretouch_lab.bench.dense_skin import gap
 from pretouch_lab.bench.motions import Motion, motion_of
-from pretouch_lab.bench.scenes import Arm, model, path_of, scenario, sensing_of
+from pretouch_lab.bench.scenes import ArmCell, model, path_of, scenario, sensing_of
 from pretouch_lab.bench.streams import AWAY, PROFILE, Alone, Stream, record_moved
 from pretouch_lab.replay import Place
 
@@ -23,7 +23,7 @@ _LOOKED_AT = 150
 """Places of a bystander that are drawn, and postures of the motion that each is held against."""
 
 
-def hard_stream(arm: Arm, seed: int) -> tuple[Stream, list[Touching]]:
+def hard_stream(arm: ArmCell, seed: int) -> tuple[Stream, list[Touching]]:
     """Let an arm move; return its stream and its contacts, none where it is not touched.
 
     With nobody near it has no units: the few readings that they would make of the arm itself are left out.

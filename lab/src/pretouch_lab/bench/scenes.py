@@ -98,7 +98,7 @@ class Sensing:
 
 
 @dataclass(frozen=True)
-class Arm:
+class ArmCell:
     """One kind of arm of the detection benchmark, and what happens to it; a seed makes one of it."""
 
     family: str
