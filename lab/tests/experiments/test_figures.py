@@ -65,11 +65,6 @@ def test_every_axis_says_its_unit(name):
     assert all("[" in words for words in said)
 
 
-def test_runs_of_flags():
-    assert figures.spans(np.array([False, True, True, False, True])) == [(1, 3), (4, 5)]
-    assert figures.spans(np.zeros(3, bool)) == []
-
-
 def test_what_is_near_counts_from_the_end_effector():
     # 0.4 m from the end-effector's origin
     assert figures.near(made_trace(), 0.41).nonzero()[0].tolist() == list(range(100, 200))
