@@ -30,16 +30,13 @@ from tests.units.fake_unit import PLAIN, FakeUnit
 
 RATE, FLOOD = 50.0, 100_000.0
 """Samples a second of each unit; datagrams a second of a flood."""
-LONGEST_BURST_S = 0.005
-"""A sender that had to wait makes up for no more than this [s]."""
-LONGEST_START_S = 30.0
-"""In this time all units must be heard, and processes end [s]."""
+LONGEST_BURST_S, LONGEST_START_S = 0.005, 30.0
+"""A sender that had to wait makes up for no more; in so long all units must be heard, and processes end."""
 KINDS = (None, "random", "forged", "replayed", "mixed")
 IMU = {"imu_count": 9, "imu_rate_hz": 450, "imu": secrets.token_bytes(9 * 12)}
-Address = tuple[str, int]
 
 
-def send_samples(keys: Keys, address: Address, stop) -> None:
+def send_samples(keys: Keys, address: tuple[str, int], stop) -> None:
     """Be all units until `stop` is set, their turns spread over the period. Their clock is the host's."""
     units, poll = {}, select.poll()
     for key in keys.values():
@@ -74,7 +71,7 @@ def garbage(kind: str, keys: Keys) -> list[bytes]:
     return kinds[kind] if kind in kinds else [d for three in zip(random, forged, cycle(replayed)) for d in three]
 
 
-def flood(kind: str, rate: float, keys: Keys, address: Address, stop, sent) -> None:
+def flood(kind: str, rate: float, keys: Keys, address: tuple[str, int], stop, sent) -> None:
     """Send garbage at that rate [1/s], as evenly as a loop can; what it could not send in time it leaves out."""
     datagrams, count = cycle(garbage(kind, keys)), 0
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
@@ -91,24 +88,21 @@ def flood(kind: str, rate: float, keys: Keys, address: Address, stop, sent) -> N
 
 
 class Outcome(NamedTuple):
-    """What was measured in one run."""
+    """Of one run: share of a core, samples, share of them that is lost, how late each was taken in [s], flood [1/s]."""
 
     cpu: float
-    """Share of a core that the receiver's process used."""
     accepted: int
     lost: float
-    """Share of the samples: of the sequence numbers between the first and the last of each unit."""
     lateness: np.ndarray
-    """Of each sample, from sending to being taken in [s]."""
     flooded: float
-    """Datagrams of the flood a second."""
 
 
-def measure(duration: float, keys: Keys, kind: str | None, priority: int | None, rate: float = FLOOD) -> Outcome | None:
-    """Let all units send for so long [s], and flood the receiver with garbage of that kind, at that rate [1/s].
+def measure(duration: float, count: int, kind: str | None, priority: int | None, rate: float = FLOOD) -> Outcome | None:
+    """Let so many units send for so long [s], and flood the receiver with garbage of that kind, at that rate [1/s].
 
     None if not all units were heard within `LONGEST_START_S`.
     """
+    keys = Keys(UnitKey(f"unit {k + 1}", k + 1, new_key()) for k in range(count))
     context = multiprocessing.get_context("spawn")
     stop, sent = context.Event(), context.Value("q", 0)
     with NetworkSkin(tuple(keys), keys) as skin:
@@ -134,39 +128,35 @@ def measure(duration: float, keys: Keys, kind: str | None, priority: int | None,
 
 
 def _watch(skin: NetworkSkin, sent, duration: float) -> Outcome:
+    def cpu_s() -> float:
+        return int(Path(f"/proc/{skin.pid}/schedstat").read_text().split()[0]) * 1e-9
+
     time.sleep(1.0)
     skin.take_samples()
-    before, flooded, begin, received = _cpu_s(skin.pid), sent.value, time.monotonic(), []
+    before, flooded, begin, received = cpu_s(), sent.value, time.monotonic(), []
     while time.monotonic() < begin + duration:
         time.sleep(0.1)
         received += skin.take_samples()
     took = time.monotonic() - begin
-    cpu, flooded = (_cpu_s(skin.pid) - before) / took, (sent.value - flooded) / took
+    cpu, flooded = (cpu_s() - before) / took, (sent.value - flooded) / took
+    # between the first and the last of each unit
     unit, sequence = np.array([(one.unit, one.sample.sequence) for one in received]).T
     every = sum(np.ptp(sequence[unit == k]) + 1 for k in np.unique(unit))
     lateness = np.array([one.arrival - 1e-6 * one.sample.time_us for one in received])
     return Outcome(cpu, len(received), 1.0 - len(received) / every, lateness, flooded)
 
 
-def _cpu_s(pid: int) -> float:
-    return int(Path(f"/proc/{pid}/schedstat").read_text().split()[0]) * 1e-9
-
-
 def main(duration: float = 10.0, count: int = 40, priority: int | None = None) -> None:
     """Measure, print."""
-    keys = Keys(UnitKey(f"unit {k + 1}", k + 1, new_key()) for k in range(count))
-    print(f"{count} units, {os.cpu_count()} processors, load before of {os.getloadavg()[0]:.1f}", flush=True)
+    print("flood [1/s], share of a core [%], lost [%] of samples, late by [ms] (50 %, 99 %, most)")
     for kind in KINDS:
-        seen = measure(duration, keys, kind, priority)
-        if seen is None:
-            print(f"{kind or 'no flood':9s} not all units were heard within {LONGEST_START_S:g} s", flush=True)
+        run = measure(duration, count, kind, priority)
+        if run is None:
+            print(f"{kind}: not all units were heard within {LONGEST_START_S:g} s", flush=True)
             continue
-        late = " / ".join(f"{ms:.2f}" for ms in 1e3 * np.percentile(seen.lateness, (50, 99, 100)))
-        print(
-            f"{kind or 'no flood':9s} {seen.flooded:7.0f}/s: {100 * seen.cpu:5.1f} % of a core;"
-            f" {100 * seen.lost:.3f} % of {seen.accepted} lost; late by {late} ms (50 % / 99 % / most)",
-            flush=True,
-        )
+        late = ", ".join(f"{1e3 * s:.2f}" for s in np.percentile(run.lateness, (50, 99, 100)))
+        lost = f"{100 * run.lost:.3f} of {run.accepted}"
+        print(f"{kind}: {run.flooded:.0f}, {100 * run.cpu:.1f}, {lost}, {late}", flush=True)
 
 
 if __name__ == "__main__":

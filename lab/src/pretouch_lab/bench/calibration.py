@@ -117,8 +117,7 @@ def simulate(
 ) -> CalibrationData:
     """Let an arm follow a plan, and measure; stamps count from its beginning.
 
-    The seed decides errors of arm, sensors and clocks, and all noise: it gives another skin of as many units the same
-    sensors on the same arm.
+    The seed decides errors of arm, sensors and clocks, and all noise.
     """
     plant = Plant(model, SceneSpec(), PlantParams(), plan.start, seed)
     samples: list[ImuSample] = []
