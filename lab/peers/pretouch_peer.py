@@ -13,8 +13,7 @@ from pretouch.compiled import compiled
 from pretouch.control.active_set import minimise_within
 from pretouch.control.approach import approach_rows, row_numbers
 from pretouch.control.joint_box import JointLimits, joint_box
-from pretouch.control.penalty import Minimum
-from pretouch.control.penalty import Problem as Program
+from pretouch.control.penalty import Minimum, QuadraticProgram
 from pretouch.control.task import cost_into
 from pretouch.controller import Controller
 from pretouch.modes import SOLVED
@@ -86,7 +85,7 @@ def _solve(q: Array, qd: Array, points: Array, velocity: Array, fixed: _Fixed, k
     jacobian_into(kin.anchor, kin.axis, fixed.moved_by[fixed.ee], kin.position[fixed.ee], J)
     cost_into(J[:3], velocity, q, fixed.q_mid, fixed.cost, np.empty(0), H, f)
     least = Minimum(x, np.empty(len(rows.h)), np.empty(n + len(rows.h)))
-    return minimise_within(Program(H, f, lower, upper, rows.G, rows.h, rows.weight), 500, least) == SOLVED
+    return minimise_within(QuadraticProgram(H, f, lower, upper, rows.G, rows.h, rows.weight), 500, least) == SOLVED
 
 
 class Rows:
