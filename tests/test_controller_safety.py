@@ -158,7 +158,7 @@ def test_a_late_step_brakes_and_the_next_goes_on(arm: Arm):
     before, arm.time = np.linalg.norm(arm.qd), arm.time + 0.06
     late = arm.step()
     assert late.mode is Mode.HOLD
-    assert "0.070 s ago, for this machine is busy" in late.reason
+    assert "0.070 s ago, because this machine is busy" in late.reason
     assert np.linalg.norm(arm.qd) < before
     assert arm.step().mode is Mode.TRACK
 

@@ -197,7 +197,7 @@ def test_a_clamp_is_said_as_such(step: ControlStep) -> None:
 def test_a_hold_says_its_cause_and_is_a_stop_where_a_person_has_to_resume(step: ControlStep) -> None:
     silent = "No usable reading from hand_left: check it; the arm continues when it reports again."
     assert said(step, mode=Mode.HOLD, event=Event.SKIN_SILENT, reason=silent) == Explanation(Doing.WAITING, silent)
-    tries = "Given up after 3 contacts: clear it; the arm tries again when 30 s have passed, or on resume."
+    tries = "The arm gave up after 3 contacts: clear it; the arm tries again when 30 s have passed, or on resume."
     assert said(step, mode=Mode.HOLD, event=Event.GIVEN_UP, reason=tries).doing is Doing.STOPPED
     assert said(step, mode=Mode.HOLD, event=Event.UNUSABLE, latched=True).doing is Doing.STOPPED
 

@@ -139,10 +139,10 @@ def test_a_state_from_too_long_ago_or_from_the_future_is_stale(age: float, stale
     assert (Event.STATE_STALE in faults) == stale
     if stale:
         old = (
-            "0.060 s old, for this machine is busy, perhaps without a real-time kernel, or the connection is slow:"
+            "0.060 s old, because this machine is busy, perhaps without a real-time kernel, or the connection is slow:"
             " close other programs and check the connection to the arm"
         )
-        early = "0.060 s in the future: let one clock stamp states and steps"
+        early = "0.060 s in the future: use one clock for states and steps"
         assert faults[Event.STATE_STALE] == (old if age > 0 else early)
         assert_last_state_moved_on(believed)
 

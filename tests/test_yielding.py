@@ -113,7 +113,7 @@ def test_a_push_that_is_held_moves_it_no_farther_than_its_reach_and_back_it_stil
     there = np.array(placed(arm.model.body, arm.model.kinematics(arm.q))[1:3])
     assert 0.97 * reach < np.linalg.norm(there - start, axis=-1).max() < 1.03 * reach
     assert np.linalg.norm(steps[-1].command) < 0.02, "it stands there"
-    assert "goes no farther" in steps[-1].reason
+    assert "moves no farther" in steps[-1].reason
     begun = [step for step in steps if step.reaction_velocity.any()]
     assert all(step.reaction_velocity @ np.array(force) > 0 for step in begun[10:]), "never towards who pushes"
     hand = arm.ee()

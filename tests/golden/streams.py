@@ -276,7 +276,7 @@ STREAMS = {
     "silent/pretouch": Stream("pretouch", silent, ("No usable reading", "slowed")),
     "faults/paper": Stream("paper", faulty, (
         "cannot be used", "Time went backwards", "The robot's state is", "no force estimate", "do not fit",
-        "The step before",
+        "The last step was",
     )),
     "faults/pretouch": Stream("pretouch", faulty, ("cannot be used", "Time went backwards", "do not fit")),
     "touch": Stream("pretouch", touched, ("contact", "localised"), touching=True),

@@ -10,10 +10,10 @@ from pretouch.params import FailureParams
 from pretouch.types import Inputs, Mode, RobotState
 
 OLD = (
-    "{:.3f} s old, for this machine is busy, perhaps without a real-time kernel, or the connection is slow: close other"
-    " programs and check the connection to the arm"
+    "{:.3f} s old, because this machine is busy, perhaps without a real-time kernel, or the connection is slow: close"
+    " other programs and check the connection to the arm"
 )
-AHEAD = "{:.3f} s in the future: let one clock stamp states and steps"
+AHEAD = "{:.3f} s in the future: use one clock for states and steps"
 FAULTS = Event.UNUSABLE, Event.TIME_BACKWARDS, Event.STATE_STALE
 PASSING = Event.SKIN_SILENT, Event.NO_FORCE, Event.OVERRUN, Event.WINDOW_FILLING
 LARGEST = 1e3
