@@ -169,7 +169,7 @@ def test_a_blocked_arm_brakes_and_tries_again_at_each_step(panda_model: RobotMod
     arm.run(100)
     steps = [arm.give(arm.inputs(0.1, RangeStatus.OK)).step for _ in range(5)]
     assert steps[0].qp.outcome is QpOutcome.INFEASIBLE
-    assert "trying again" in steps[0].reason
+    assert "tries again" in steps[0].reason
     for step in steps:
         assert (step.mode is Mode.HOLD) == (step.qp.outcome is QpOutcome.INFEASIBLE)
     assert arm.run(20)[-1].mode is Mode.TRACK

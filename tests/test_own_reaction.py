@@ -48,7 +48,7 @@ def test_a_reaction_of_somebody_else_moves_the_arm_as_long_as_it_says(arm: Arm):
     assert len(reacting) == 20
     assert all(step.reaction_velocity.tolist() == [0.0, 0.0, 0.05] for step in reacting)
     assert max(step.ee_position[2] for step in reacting) > height
-    assert "cycles left" in reacting[-1].reason
+    assert "for another" in reacting[-1].reason
     assert steps[-1].mode is Mode.TRACK
 
 
