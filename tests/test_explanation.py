@@ -168,7 +168,7 @@ def test_a_contact_that_would_move_the_arm_into_something_names_the_unit(step: C
         step, command=np.zeros(7), obstacles=seen((0, 0.2, 0.03, 2)), restricted=np.array([0]),
         approach_limit=np.zeros(1), qp=limited(),
     )  # fmt: skip
-    assert found.sentence == "Touched at link5 with 13 N: held still, for hand_front sees something at 0.03 m."
+    assert found.sentence == "Touched at link5 with 13 N: held still, because hand_front sees something at 0.03 m."
 
 
 def test_a_new_contact_is_said_by_its_force_and_one_that_has_ended_with_what_follows(step: ControlStep) -> None:
@@ -178,7 +178,7 @@ def test_a_new_contact_is_said_by_its_force_and_one_that_has_ended_with_what_fol
     ended = touched(step, **over, command=np.zeros(7))
     assert ended == Explanation(Doing.WAITING, "The push has ended. The task continues 1 s after the last push.")
     eq_12 = touched(step, **over, event=Event.REACTING, detail="1.20 s")
-    assert eq_12 == Explanation(Doing.YIELDING, "Moving the way it was pushed: 1.20 s left.")
+    assert eq_12 == Explanation(Doing.YIELDING, "Moving in the direction of the push for another 1.20 s.")
 
 
 def test_a_force_without_a_place_is_the_estimate_less_its_mean_and_nothing_where_there_is_none(
