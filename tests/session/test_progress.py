@@ -67,7 +67,7 @@ def test_contacts_are_counted_and_a_line_comes_every_five_seconds(watched):
     before = len(told)
     turn(900)
     reaction, *lines = told[before:]
-    assert reaction == "REACT Moving the way it was pushed: 0.99 s left."
+    assert reaction == "REACT Moving in the direction of the push for another 0.99 s."
     assert 1 <= len(lines) <= 3
     assert all(line == "TRACK In position: nothing near is seen." for line in lines[1:])
     assert any("1 contact." in sentence for sentence in reporter.summary.sentences(0.01))
