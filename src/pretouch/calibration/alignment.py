@@ -26,16 +26,11 @@ class Alignment:
 def align(
     turning: FloatArray, turned: BoolArray, sensed: FloatArray, sensing: BoolArray, step: float, most: float
 ) -> Alignment:
-    """Find the lag at which a gyroscope measured what a link did.
+    """Find the lag, at most `most` [s] either way, at which a gyroscope measured the rotation of a link.
 
-    Args:
-        turning: (N, 3) angular velocity of the link, link frame [rad/s].
-        turned: (N,) whether it is known.
-        sensed: (M, 3) what the gyroscope measured, sensor frame [rad/s]; the first at the same instant as that of the
-            link if the clocks agree.
-        sensing: (M,) whether it is known.
-        step: between instants [s].
-        most: largest lag to consider, either way [s].
+    `turning` (N, 3) is the angular velocity of the link in its frame, `sensed` (M, 3) that of the sensor in its frame
+    [rad/s], both every `step` [s] and from the same instant if the clocks agree; `turned` (N,) and `sensing` (M,) mask
+    the known ones.
     """
     a, b = _centred(turning, turned), _centred(sensed, sensing)
     length = scipy.fft.next_fast_len(len(a) + len(b), real=True)

@@ -128,12 +128,10 @@ class Axis:
 
 
 def unknown_directions(covariance: FloatArray, T_link_sensor: FloatArray, axis: Axis) -> tuple[str, ...]:
-    """Say in words what of a pose is not known as well as it has to be.
+    """Describe the directions of a pose (4, 4) that are less certain than required.
 
-    Args:
-        covariance: (6, 6) of rotation vector in the sensor frame [rad] and position in the link frame [m].
-        T_link_sensor: (4, 4) the pose.
-        axis: of the last joint that moves the link.
+    `covariance` (6, 6) is of the rotation vector in the sensor frame [rad] and the position in the link frame [m];
+    `axis` is that of the last joint that moves the link.
     """
     turned = np.eye(6)
     turned[TURN, TURN] = T_link_sensor[:3, :3]
@@ -217,15 +215,9 @@ def mounting_findings(model: RobotModel, link: int, T: FloatArray) -> list[Remar
 
 
 def likely_member(model: RobotModel, body: tuple[int, ...], link: int, T: FloatArray) -> int:
-    """Return the link, of those fixed to each other, on whose surface a unit most likely sits.
+    """Return the link, of those of a rigid body, on whose surface a unit at T (4, 4) on one of them most likely sits.
 
-    Nearest to it, and looked away from. Links without a capsule are chosen only if none has one.
-
-    Args:
-        model: the arm.
-        body: indices of the links.
-        link: one of them.
-        T: (4, 4) pose of the unit on that link.
+    It is the nearest one that the unit looks away from. Links without a capsule are chosen only if none has one.
     """
 
     def oddity(member: int) -> float:

@@ -169,14 +169,10 @@ class Fit:
 
 
 def fit(motion: LinkMotion, measured: Measured, begin: Estimate, noise: FloatArray, robust: bool = False) -> Fit:
-    """Find the most likely estimate.
+    """Find the most likely estimate from the motion of a link and its IMU at the same N instants.
 
-    Args:
-        motion: of the link, N instants.
-        measured: by the IMU at the same instants.
-        begin: an estimate near the right one.
-        noise: (6,) standard deviation to weight angular velocities [rad/s] and accelerations [m/s^2] by.
-        robust: let large differences count less.
+    `begin` is an estimate near the right one, `noise` (6,) the standard deviations of angular velocities [rad/s] and
+    accelerations [m/s^2]; `robust` lets large differences count less.
     """
     problem = Problem(motion, measured, begin, noise)
     x = begin.errors

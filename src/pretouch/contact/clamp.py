@@ -91,19 +91,12 @@ def begin_pinch(state: ClampState, path: FloatArray, between: str, force: float,
 def update_clamp(
     state: ClampState, torque: FloatArray, velocity: FloatArray, q: FloatArray, dt: float, p: ClampParams
 ) -> ClampState:
-    """Update the detection of a clamp by one period of yielding.
+    """Update the detection of a clamp by one period dt [s] of yielding.
 
     A clamp is a torque against the course on which the arm follows a push, for longer than noise makes one, and so soon
     after the push that the push may still be there. Later it is a push of its own, to which the arm yields; but that
     too is a clamp when the arm is pushed to and fro. A push from the side, or harder in the same direction, is none.
-
-    Args:
-        state: memory.
-        torque: (n,) external torque [Nm].
-        velocity: (n,) of the virtual mass [rad/s].
-        q: (n,) commanded joint positions [rad].
-        dt: period [s].
-        p: parameters.
+    `torque` (n,) is external [Nm], `velocity` (n,) that of the virtual mass [rad/s], `q` (n,) commanded [rad].
     """
     speed = float(np.sqrt(velocity @ velocity))
     # the part of the torque along the motion in joint space, negative against it
@@ -135,13 +128,7 @@ def open_clamp(
 
     The motion ends after its time, at the end of the path, and where a torque opposes it as in a clamp: the arm then
     does not push against a force. Marks of the path to a pinch that are already behind the arm are left out.
-
-    Args:
-        state: of a clamp.
-        torque: (n,) external torque [Nm].
-        q: (n,) commanded joint positions [rad].
-        dt: period [s].
-        p: parameters.
+    `torque` (n,) is external [Nm], `q` (n,) commanded [rad], `dt` the period [s].
     """
     trail = state.trail
     # skip the marks that are reached, and those that lead back into the pinch
@@ -181,17 +168,10 @@ _NEAR_RAD = 0.002
 def find_pinch(
     model: RobotModel, kin: Kinematics, torque: FloatArray, covariance: FloatArray, qd: FloatArray, p: PinchParams
 ) -> tuple[int, int, float] | None:
-    """Return the two links of a pinch, and the force with which it pushes them apart [N], or None.
+    """Return the two approaching links of a pinch, and the force that pushes them apart [N], or None.
 
-    The links approach each other.
-
-    Args:
-        model: the arm.
-        kin: its posture.
-        torque: (n,) external torques less those of free motion [Nm].
-        covariance: (n, n) of the torques in free motion [Nm^2].
-        qd: (n,) joint velocities of the arm at the contact [rad/s].
-        p: parameters.
+    `torque` (n,) [Nm] is external, less that of free motion with its covariance (n, n) [Nm^2]; `qd` (n,) [rad/s] are
+    the joint velocities at the contact.
     """
     body, (first, second) = model.capsules, model.apart.T
     _, a, b, _ = placed(body, kin)
@@ -234,12 +214,7 @@ def find_pinch(
 def presses_on_fixture(body: Body, kin: Kinematics, touched: Touched, qd: FloatArray, p: PinchParams) -> bool:
     """Return whether a link presses an object against a fixture, by the most certain contact's point and force.
 
-    Args:
-        body: the arm and its fixtures, whose normals point into free space.
-        kin: its posture.
-        touched: the contacts.
-        qd: (n,) joint velocities of the arm at the contact [rad/s].
-        p: parameters.
+    The fixtures' normals point into free space; `qd` (n,) [rad/s] are the joint velocities at the contact.
     """
     if not len(touched.link):
         return False

@@ -79,13 +79,9 @@ def find_lasting(
 ) -> bool:
     """Write a load or a step of one joint that explains the residual, and return whether there is one.
 
-    Args:
-        means: of the residual; only the longest window counts.
-        x: (n, f) features.
-        weights: (n, f) of the mean learnt so far [Nm].
-        J: (6, n) Jacobian of the end-effector.
-        offset_prior: deviation of a joint's offset [Nm].
-        lasting: (3 + n,) written: load [kg], its moments about both horizontal axes [kg m], each joint's torque [Nm].
+    Of the residual's means only the longest window counts. `x` (n, f) are features with `weights` (n, f) [Nm] of the
+    mean learnt so far, `J` (6, n) is the end-effector's Jacobian, `offset_prior` a joint offset's deviation [Nm].
+    `lasting` (3 + n,) is written: load [kg], its moments about both horizontal axes [kg m], each joint's torque [Nm].
     """
     residual, S, n, last = means.mean[-1], means.S, x.shape[0], x.shape[1] - 1
     carried, load = np.empty(n), np.zeros(3)

@@ -168,15 +168,8 @@ def _infer(
 ) -> float:  # fmt: skip
     """Write average and contact; return the weight of the average, -1 without a significant mean.
 
-    Args:
-        kin: posture.
-        arm: joints that move each link (L, n), rigid body of each link (L,), surface and capsules.
-        sample: means of the newest residuals, and the independent part of a sample.
-        near: obstacles.
-        cues: of the touch sensors.
-        p: parameters.
-        so_far: average of the contact so far (N,), and its weight.
-        contact: written.
+    `arm` has the joints that move each link (L, n), each link's rigid body (L,), surface and capsules; `sample` the
+    means of the newest residuals and the independent part of a sample; `so_far` the contact's average (N,) and weight.
     """
     (moved_by, rigid, surface, capsules), (tested, independent), (average, before) = arm, sample, so_far
     n, count = len(kin.anchor), len(surface.link)

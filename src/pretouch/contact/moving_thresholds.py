@@ -89,15 +89,9 @@ class MovingThresholds(ThresholdParams, Detector, name="thresholds"):
     ) -> Detection:  # fmt: skip
         """Compare a force (3,) [N] with the thresholds by its window and the obstacles.
 
-        A contact has the force less its mean, F_ext of eq. 12.
-
-        Args:
-            window: with the force in it.
-            force: on the robot, base frame; None without an estimate: then there is no contact.
-            armed: whether the window was full before it.
-            ee: (3,) end-effector origin [m].
-            near: obstacles.
-            residual: (n,) of the detection.
+        A contact has the force less its mean, F_ext of eq. 12. The window contains the force, which is on the robot, base
+        frame, None without an estimate: then there is no contact. `armed`: the window was full before; `ee` (3,) is the
+        end-effector's origin [m]; `residual` (n,) is that of the detection.
         """
         parts = np.empty((6, 3))
         # NaN crosses no threshold: without an estimate there is no contact

@@ -76,11 +76,8 @@ class Hypotheses(NamedTuple):
 def judge(means: WindowMeans, contacts: Hypotheses, gain: float, tails: float) -> tuple[float, int, int]:
     """Return ln R, and the window and the hypothesis with the largest part in it.
 
-    Args:
-        means: of residuals, with their distribution in free motion.
-        contacts: hypotheses.
-        gain: g, ratio of a contact's spread to that of free motion.
-        tails: degrees of freedom of the Student distribution.
+    `means` are of residuals, with their distribution in free motion; `gain` is g, the ratio of a contact's spread to
+    that of free motion; `tails` are the degrees of freedom of the Student distribution.
     """
     J, joints, weight, away = contacts
     scatter, whitened, squares, ratios = means.scatter, means.whitened, means.square, means.ratio

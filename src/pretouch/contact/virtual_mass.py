@@ -143,17 +143,10 @@ def yield_to(
     mass: VirtualMass, residual: FloatArray, command: FloatArray, band: FloatArray, axes: Axes, p: AdmittanceParams,
     dt: float, contact: bool,
 ) -> None:  # fmt: skip
-    """Move the virtual mass by one period under the external torque.
+    """Move the virtual mass by one period dt [s] under the external torque `residual` (n,) [Nm].
 
-    Args:
-        mass: changed.
-        residual: (n,) external torque [Nm].
-        command: (n,) last joint velocity command [rad/s].
-        band: (n,) dead band [Nm].
-        axes: of the body, in this posture.
-        p: parameters.
-        dt: period [s].
-        contact: whether a contact is detected.
+    `command` (n,) is the last joint velocity command [rad/s], `band` (n,) the dead band [Nm], `axes` are the body's in
+    this posture; `contact` tells that a contact is detected.
     """
     pushed, velocity = _drive(mass, residual, command, band, p, dt), mass.velocity
     velocity *= min(1.0, p.speed_max_m_s / max(fastest_point(axes, velocity), _LEAST_M_S))

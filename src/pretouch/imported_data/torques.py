@@ -190,14 +190,8 @@ def observed(
 ) -> FloatArray:
     """External torques (N, n) on the robot [Nm] by our momentum observer, NaN after each gap until it has settled.
 
-    Args:
-        model: the arm.
-        time: instants (N,) [s].
-        q: positions (N, n) [rad].
-        qd: velocities (N, n) [rad/s].
-        tau: torques (N, n) that drive the joints, gravity in them [Nm].
-        gain: of the observer [1/s].
-        payload: mass at the end-effector [kg].
+    `time` (N,) [s], `q` (N, n) [rad], `qd` (N, n) [rad/s]; `tau` (N, n) [Nm] drive the joints and contain gravity;
+    `gain` is the observer's [1/s], `payload` the mass at the end-effector [kg].
     """
     external = np.full_like(tau, np.nan)
     for piece in pieces(time):

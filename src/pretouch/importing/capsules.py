@@ -81,12 +81,9 @@ class Outside:
 
 
 def bodies_of(arm: ArmChain, most: int = MOST, cover: bool = False) -> tuple[LinkBody, ...]:
-    """Return the capsules of all links that have a surface.
+    """Return the capsules of all links that have a surface, at most `most` for a link.
 
-    Args:
-        arm: the arm.
-        most: capsules for one link at most.
-        cover: whether fitted capsules are enlarged until no surface sticks out of them.
+    `cover` enlarges fitted capsules until no surface sticks out of them.
     """
     robot = arm.robot
     # every mesh is read before the first link is fitted: what is wrong with one is said at once

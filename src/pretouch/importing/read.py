@@ -60,13 +60,9 @@ def described(name: str) -> tuple[Path, Path] | None:
 
 
 def read_robot(file: Path, folders: tuple[Path, ...] = ()) -> RobotTree:
-    """Read a robot from a URDF or MJCF file. What is wrong with it is a RobotModelError that names it.
+    """Read a robot from a URDF or MJCF file. A fault of the file is a RobotModelError that names it.
 
-    Meshes of a URDF are found and read when they are needed.
-
-    Args:
-        file: the file.
-        folders: that hold the ROS packages a URDF names, or are packages themselves.
+    Meshes of a URDF are read when they are needed. `folders` hold the ROS packages that it names, or are packages.
     """
     if odd := [folder for folder in folders if not folder.is_dir()]:
         raise RobotModelError(f"The package path {odd[0]} is not a folder: give one that holds ROS packages.")

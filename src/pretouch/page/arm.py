@@ -54,13 +54,9 @@ def in_levels(expected: FloatArray) -> tuple[int, ...]:
 
 
 def shares(vertices: FloatArray, normals: FloatArray, origin: FloatArray, beam: FloatArray) -> FloatArray:
-    """Shares w (V, K) that vertices have in what units expect.
+    """Shares w (V, K) that vertices have in the expectations of units.
 
-    Args:
-        vertices: (V, 3) [m].
-        normals: (V, 3) unit vectors, outwards.
-        origin: (K, 3) of the units [m], same frame.
-        beam: (K, 3) unit vectors, same frame.
+    `vertices` (V, 3) [m] with outward unit `normals` (V, 3); `origin` (K, 3) [m] and unit `beam` (K, 3), same frame.
     """
     apart = np.linalg.norm(vertices[:, None] - origin[None], axis=2)
     near = np.maximum(1.0 - (apart / SPREAD_M) ** 2, 0.0) ** 2

@@ -155,13 +155,10 @@ class ActionQueue:
         return len(self._waiting)
 
     def put(self, action: Callable[[], object], kind: str = "", settle: float = 0.0, quiet: bool = False) -> None:
-        """Ask for an action; it takes the place of one of the same kind that still waits, unless that is ''.
+        """Request an action; it replaces a waiting one of the same kind, unless that is ''.
 
-        Args:
-            action: to be done.
-            kind: of the action, or ''.
-            settle: how long it waits for a newer one of its kind, as somebody types a number key by key [s].
-            quiet: whether it leaves the notice on the page.
+        `settle` is the time to wait for a newer one of its kind [s], as somebody types a number key by key; `quiet`
+        leaves the notice on the page.
         """
         with self._lock:
             key: object = kind or object()

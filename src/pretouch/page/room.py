@@ -143,13 +143,8 @@ def at_depth(model: RobotModel, q: FloatArray, eye: FloatArray, place: FloatArra
 
     A pointer has no depth: without this a hand dragged onto the arm in the picture may pass half a metre before it.
     Each point of the line counts for the depth by how near it is to the arm and to the place, so that nothing jumps
-    from one link to another behind it; far from the arm the place stays as it is.
-
-    Args:
-        model: the arm.
-        q: (n,) its joint positions [rad].
-        eye: (3,) where the person looks from [m], base frame.
-        place: (3,) [m], base frame.
+    from one link to another behind it; far from the arm the place stays as it is. `q` (n,) [rad]; `eye` (3,) [m] is the
+    person's point of view, base frame.
     """
     shares = np.linspace(*_DEPTHS, _LOOKS)
     points = eye + shares[:, None] * (place - eye)

@@ -18,15 +18,8 @@ def move_back(
     """Move sensor poses, (K, 3) [m] and (K, 3, 3), from the instant of the arm's posture back to their stamps (K,) [s].
 
     That is the motion of their links at the joint velocities (n,) [rad/s], to first order in the position; the rotation
-    is exact for a constant angular velocity. No reading counts as older than `longest` [s].
-
-    Args:
-        sensors: changed.
-        moved: (K,) flags of the sensors to move.
-        stamp: of the readings.
-        chain: of the arm.
-        posed: instant of the arm's posture [s].
-        longest: see above.
+    is exact for a constant angular velocity. Only sensors with a flag `moved` (K,) change; `posed` is the instant of the
+    posture [s]. No reading counts as older than `longest` [s].
     """
     position, rotation, unit_link = sensors
     axis, moved_by, qd = chain.axis, chain.moved_by, chain.qd

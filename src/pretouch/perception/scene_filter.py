@@ -64,14 +64,8 @@ def floor_and_pedestal(floor: float, radius: float = 0.1) -> Fixtures:
 def expected_range(kin: Kinematics, sensors: Sensors, cones: Cones, body: Capsules, fixtures: Fixtures) -> FloatArray:
     """Return the distance (K,) [m] at which each sensor would see the arm or a fixture, infinite without a return.
 
-    It is the least over rays that fill the sensor's cone. A unit does not see its own link.
-
-    Args:
-        kin: posture.
-        sensors: K of them, placed.
-        cones: of the sensors.
-        body: the arm as capsules, base included.
-        fixtures: around the arm.
+    It is the least over rays that fill the placed sensor's cone. A unit does not see its own link. `body` is the arm
+    as capsules, base included.
     """
     near = np.array([plane_return(sensors, k, fixtures.planes, cones, np.inf) for k in range(len(sensors.link))])
     for part in (body, fixtures.capsules):

@@ -40,12 +40,9 @@ class Recording:
     """
 
     def __init__(self, place: Path, controller: Controller, about: Mapping[str, JSON] | None = None) -> None:
-        """Begin a file for what a controller does.
+        """Begin a file, in a folder that exists, for the cycles of a controller.
 
-        Args:
-            place: file to make; its folder must be there.
-            controller: whose cycles will be recorded.
-            about: what else is to be known of the run, as JSON has it; `scene` with `boxes` is drawn by viewers.
+        `about` has further facts on the run, as JSON; viewers draw its `scene` with `boxes`.
         """
         self.place, self._about = Path(place), about or {}
         self._cycles = Cycles(controller, self._about)

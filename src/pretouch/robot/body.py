@@ -122,15 +122,10 @@ def bodies_of(moved_by: BoolArray) -> IntArray:
 
 
 def surface_of(body: Capsules, moved_by: BoolArray, kin: Kinematics, spacing: float = SPACING_M) -> Surface:
-    """Return points spread over C capsules, without those inside another capsule of the same rigid body.
+    """Return points, `spacing` [m] apart, over C capsules, without those inside another capsule of the same rigid body.
 
-    Args:
-        body: the capsules.
-        moved_by: (L, n) whether a joint moves a link.
-        kin: any one posture.
-        spacing: approximate distance of neighbours [m].
-
-    Raises RobotModelError for a body far larger than any arm's.
+    `moved_by` (L, n) masks the joints that move a link; any posture does. A body far larger than any arm's is a
+    RobotModelError.
     """
     size = 2 * np.pi * float((body.radius * (np.linalg.norm(body.b - body.a, axis=1) + 2 * body.radius)).sum())
     if len(body.radius) > _MOST_CAPSULES or not size <= _MOST_AREA:

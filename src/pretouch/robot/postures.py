@@ -90,9 +90,7 @@ def capsule_ends(model: RobotModel, kin: Kinematics) -> FloatArray:
 def self_distances(model: RobotModel, ends: FloatArray) -> FloatArray:
     """Distances (S, P) [m] between the surfaces of the pairs of `RobotModel.apart`, negative in penetration.
 
-    Args:
-        model: the arm.
-        ends: (S, C, 2, 3) of `capsule_ends`.
+    `ends` (S, C, 2, 3) are of `capsule_ends`.
     """
     first, second = model.apart.T
     a, b, radius = ends[:, first], ends[:, second], model.capsules.radius

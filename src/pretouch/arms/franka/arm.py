@@ -44,15 +44,10 @@ class FrankaArm:
         behavior: CollisionBehavior | None = None,
         priority: int | None = None,
     ) -> None:
-        """Start the process and connect; what stands in the way is a RobotError.
+        """Start the process of the arm at a name or IP address, and connect; a failure is a RobotError.
 
-        Args:
-            address: name or IP address of the arm.
-            kind: which arm it is.
-            model: of the arm, for its limits.
-            params: settings of the process.
-            behavior: from which forces the arm stops by itself; None leaves that as it is.
-            priority: real-time priority of the process, see `realtime.real_time`.
+        `behavior` has the forces from which the arm stops by itself, None leaves them as they are; `priority` is the
+        real-time priority of the process, see `realtime.real_time`.
         """
         check_wishes(priority, None)
         self._address, self._owner = address, os.getpid()

@@ -54,14 +54,10 @@ class FrankaState:
 
 
 def robot_state(state: FrankaState, stamp: float) -> RobotState:
-    """Return a state in our terms: force and torques **on the robot by the environment**.
+    """Return a state with our sign, force and torques **on the robot by the environment**, and the caller's stamp [s].
 
     The vendor's are those by the robot on its environment (libfranka, `robot_state.h`), and a wrench that is exactly
-    zero says that there is no estimate, as near a singularity.
-
-    Args:
-        state: as the arm gave it.
-        stamp: when, by the clock of the caller [s].
+    zero means that there is no estimate, as near a singularity.
     """
     wrench = -state.wrench if state.wrench.any() else None
     return RobotState(stamp, state.q, state.qd, state.q_d, state.dq_d, -state.tau_ext, wrench)

@@ -81,17 +81,10 @@ def run(
     done: Callable[[float], bool],
     say: Callable[[str], None],
 ) -> None:
-    """Simulate an arm on a path whose units are a fleet, until `done` says so; then the arm is brought to rest.
+    """Simulate an arm on a path until `done`, whose units are a fleet; then bring the arm to rest.
 
-    Args:
-        model: the arm.
-        skin: its units.
-        fleet: the same units, as they send.
-        path: of the end-effector.
-        profile: parameters of the controller.
-        hand: whether a person's hand comes and goes.
-        done: is asked at each step, with the time since the begin [s].
-        say: is handed a line each second.
+    `hand` makes a person's hand come and go; `done` is asked at each step, with the time since the begin [s]; `say`
+    receives a line each second.
     """
     scene = SceneSpec(hand=HandSpec(start=VisitingHand.away)) if hand else SceneSpec()
     arm = SimulatedArm(model, brought_to(model, path.point(0.0)), skin, fleet, scene, profile.task.control_period_s)

@@ -39,13 +39,10 @@ _SHORTEST_M = 1e-5
 def plan_controller(
     model: RobotModel, q: FloatArray, like: Profile | None = None, fixtures: Fixtures | None = None
 ) -> Controller:
-    """Return the controller of an arm that stands at q (n,) [rad] and is to follow a plan: without a skin.
+    """Return the controller, without a skin, of an arm that stands at q (n,) [rad] and is to follow a plan.
 
-    Args:
-        model: the arm.
-        q: where it stands.
-        like: a profile whose rate and patience with failures count; None: those of `blind`.
-        fixtures: what stands still around it, of which a controller without a skin sees nothing.
+    `like` is a profile whose rate and patience with failures count (None: `blind`), `fixtures` the static objects
+    around the arm, of which a controller without a skin sees nothing.
     """
     profile = PROFILES["blind"]
     profile = replace(profile, task=replace(profile.task, position_gain_1_s=_GAIN_1_S))

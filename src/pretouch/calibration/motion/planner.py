@@ -34,14 +34,9 @@ _LONGEST_WAY_S = 15.0
 
 
 def plan_motion(model: RobotModel, params: PlanParams = PlanParams(), start: FloatArray | None = None) -> Plan:  # noqa: B008
-    """Plan a motion that makes the poses of units on all links known, from a posture and back to it.
+    """Plan a motion that makes the poses of units on all links observable, from a posture (n,) [rad] and back to it.
 
-    Args:
-        model: the arm.
-        params: what is asked.
-        start: (n,) joint positions in which it begins [rad]; the arm's ready posture if none are given.
-
-    Raises CalibrationError, saying what to change, where there is no such motion.
+    The arm's ready posture is the default start. A CalibrationError says what to change where there is no such motion.
     """
     from scipy.stats.qmc import Sobol  # takes a third of a second, and a plan may never be asked for
 

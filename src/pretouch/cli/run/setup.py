@@ -104,12 +104,9 @@ def run_setup(arm: ArmOptions, robot: RobotOptions, units: SkinOptions, task: Ta
 
 
 def free_motion(options: RobotOptions, controller: Controller, robot: str) -> FreeMotion | None:
-    """Read what is known of a robot's free motion, and say it; None where none is remembered.
+    """Read the learnt free motion of a robot, and print it; None where none is remembered.
 
-    Args:
-        options: `learnt`, `learn_anew` and `no_learnt` of them.
-        controller: that moves the arm.
-        robot: what it is known by.
+    `options` are `learnt`, `learn_anew` and `no_learnt`; `robot` is the name that it is remembered by.
     """
     if not isinstance(controller.profile.detect, SequentialTest):
         if options.learnt or options.learn_anew:
