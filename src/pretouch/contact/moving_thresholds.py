@@ -89,7 +89,7 @@ class MovingThresholds(ThresholdParams, Detector, name="thresholds"):
     ) -> Detection:  # fmt: skip
         """Compare a force (3,) [N] with the thresholds by its window and the obstacles.
 
-        A contact has the force less its mean, F_ext of eq. 12. The window contains the force, which is on the robot, base
+        A contact has the force less its mean, F_ext of eq. 12. The window contains the force, on the robot, base
         frame, None without an estimate: then there is no contact. `armed`: the window was full before; `ee` (3,) is the
         end-effector's origin [m]; `residual` (n,) is that of the detection.
         """

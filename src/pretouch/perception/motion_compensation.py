@@ -18,7 +18,7 @@ def move_back(
     """Move sensor poses, (K, 3) [m] and (K, 3, 3), from the instant of the arm's posture back to their stamps (K,) [s].
 
     That is the motion of their links at the joint velocities (n,) [rad/s], to first order in the position; the rotation
-    is exact for a constant angular velocity. Only sensors with a flag `moved` (K,) change; `posed` is the instant of the
+    is exact for a constant angular velocity. Only sensors with a flag `moved` (K,) change; `posed` is that of the
     posture [s]. No reading counts as older than `longest` [s].
     """
     position, rotation, unit_link = sensors
