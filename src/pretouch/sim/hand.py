@@ -17,7 +17,7 @@ _NONE = np.zeros(3)
 
 
 class HandGoal(NamedTuple):
-    """Where the arm of the person wants the hand to be."""
+    """Target that the person's arm moves the hand to."""
 
     position: FloatArray
     """(3,) from the point of the link, axes of the base frame [m]."""
@@ -30,9 +30,9 @@ class HandGoal(NamedTuple):
     rate: FloatArray = _NONE
     """(3,) its velocity in that frame [m/s]."""
     way_round: bool = False
-    """Whether the hand goes there by `physics.way_round`."""
+    """True if the hand goes there by `physics.way_round`."""
     until: float = -np.inf
-    """When the person thinks again, if nothing touches before [s]."""
+    """Time until which the goal holds, if nothing touches before [s]."""
 
 
 class PersonArm(NamedTuple):
@@ -47,11 +47,11 @@ class PersonArm(NamedTuple):
 
 
 USUAL_ARM = PersonArm()
-"""Of a person of whom nothing else is said."""
+"""Arm of a person without other parameters."""
 
 
 class HandScript(Protocol):
-    """What a person means to do."""
+    """Script of a simulated person."""
 
     def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
         """Return the goal at a time [s], with the hand's position (3,) [m] and the arm for the person to look at."""
@@ -93,7 +93,7 @@ class Hand:
 
 
 def point_on_arm(plant: Plant, link: int, offset: FloatArray) -> FloatArray:
-    """Where a point fixed to a link, `offset` (3,) [m] in its frame, is now (3,) [m], base frame."""
+    """Return the position (3,) [m], base frame, of a point fixed to a link at `offset` (3,) [m] in its frame."""
     return plant.link_position[link] + plant.link_rotation[link] @ offset
 
 
@@ -117,7 +117,7 @@ class Push:
     """One push against a face of the robot's hand."""
 
     start: float
-    """When the person reaches for the arm [s]."""
+    """Time at which the person reaches for the arm [s]."""
     inwards: FloatArray
     """(3,) unit vector of the push in the frame of `RobotHand`: against the normal of a face, or nearly."""
     force: float

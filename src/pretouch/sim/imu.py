@@ -23,7 +23,7 @@ _DRAWS = 2048
 
 @dataclass(frozen=True)
 class ImuParams(Checked):
-    """How the inertial sensors of a skin err. Where ST gives a typical value, each sensor's is uniform up to it."""
+    """Errors of a skin's inertial sensors. Where ST gives a typical value, each sensor's is uniform up to it."""
 
     rate_hz: Annotated[float, Check(low=12.0, high=1666.0)] = 416.0
     """Nominal rate of samples, of both sensors alike [Hz]: the first of the sensor's rates above 400 Hz."""
@@ -60,7 +60,7 @@ class ImuSample(NamedTuple):
     unit: int
     """Index of the unit in the skin, of one with zones that of its first."""
     time: float
-    """When it was taken [s]."""
+    """Time of the sample [s]."""
     counts: IntArray
     """(6,) gyroscope x, y, z, accelerometer x, y, z, in the unit's sensor frame, each of 16 bits."""
 
@@ -76,7 +76,7 @@ class _Bodies(NamedTuple):
 
 
 class _ImusOnLinks(NamedTuple):
-    """Where K sensors sit, how they err, gyroscope first, and what they keep from one physics step to the next."""
+    """Poses of K sensors, their errors, gyroscope first, and their state from one physics step to the next."""
 
     bodies: _Bodies
     link: IntArray  # (K,)

@@ -1,4 +1,4 @@
-"""What the arm meets in the paper's experiments: a board beside its path (IV-A), a person who pushes it (IV-C).
+"""Scenes of the paper's experiments: a board beside the arm's path (IV-A), a person who pushes it (IV-C).
 
 And how paths, board and person are brought into the reach of another arm than a Panda.
 """
@@ -28,12 +28,12 @@ _OUTWARDS_M = 0.12
 
 @dataclass(frozen=True)
 class HandSide:
-    """Where the side of the robot's hand that meets the board is, hand as in the ready posture."""
+    """Position of the side of the robot's hand that meets the board, hand as in the ready posture."""
 
     aside: float = 0.102
-    """How far it is out from the end-effector's origin, along y [m]; the Panda's."""
+    """Distance outwards from the end-effector's origin, along y [m]; the Panda's."""
     above: float = 0.057
-    """How far it is above the end-effector's origin [m]; the Panda's."""
+    """Height above the end-effector's origin [m]; the Panda's."""
 
 
 PANDA_SIDE = HandSide()
@@ -82,15 +82,15 @@ _LASTING_S = (0.2, 0.5)
 
 @dataclass(frozen=True)
 class Placement:
-    """Where the paper's paths are for an arm: p = scale * p_paper, in the base frame."""
+    """Placement of the paper's paths for an arm: p = scale * p_paper, in the base frame."""
 
     scale: float = 1.0
     left: HandSide = PANDA_SIDE
-    """Where the hand meets a board at +y."""
+    """Side of the hand that meets a board at +y."""
     right: HandSide = PANDA_SIDE
-    """Where the hand meets a board at -y."""
+    """Side of the hand that meets a board at -y."""
     beside: tuple[float, float] = (0.43, 0.43)
-    """How far from the plane y = 0 a person's hand is held beside the circle, at -y and at +y [m]: the Panda's hand,
+    """Distance of a person's hand beside the circle from the plane y = 0, at -y and at +y [m]: the Panda's hand,
     whose side comes to 0.35 m, passes it by 3 cm."""
     inside: tuple[float, float] = (0.35, 0.35)
     """The same of a hand half of which is in the way."""
@@ -180,12 +180,12 @@ def dynamic_pushes(seed: int) -> tuple[Push, ...]:
 
 
 _SCALES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
-"""What is tried, the paper's own size first."""
+"""Scales that are tried, the paper's own size first."""
 _PATHS = (("circle", -1.0), ("circle", 1.0), ("line", -1.0), ("line", 1.0))
-"""What is to be followed, begun on either side."""
+"""Paths to follow, begun on either side."""
 _PLACES, _JOINTS = 24, 6
 _SINGULAR, _LIMIT_RAD, _CLEAR_M = 0.05, 0.05, 0.01
-"""What the arm has to keep all along: smallest singular value, distance from joint limits, and from itself."""
+"""Bounds all along a path: smallest singular value, distance from joint limits, and from itself."""
 _HELD = 0.8
 """Largest part of a joint's torque that may go into holding the arm: what is left has to move it."""
 _BESIDE_M, _INSIDE_M = 0.078, 0.0

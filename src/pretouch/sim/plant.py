@@ -91,7 +91,7 @@ class ArmInWorld:
         """`first_body` is the index in MuJoCo's of what is link 0 of the arm: its links follow."""
         moving = np.flatnonzero(self.model.moved_by.any(axis=1))
         self._geom_link = mj_model.geom_bodyid - body
-        """Of which link each geom is, of other things -1."""
+        """Link of each geom, -1 for other objects."""
         self._geom_link[~np.isin(self._geom_link, moving)] = -1
         # views into the simulation's memory, taken once: MuJoCo's attribute look-ups cost as much as the arithmetic
         self.link_position, self.link_rotation = mj_data.xpos[body:], mj_data.xmat.reshape(-1, 3, 3)[body:]
@@ -100,7 +100,7 @@ class ArmInWorld:
         mj_data.qpos[own] = q
         mujoco.mj_forward(mj_model, mj_data)
         self.stiffness = np.array(self.params.stiffness_nm_rad)
-        """Of the joint impedance (n,) [Nm/rad]; `set_stiffness` changes it."""
+        """Stiffness of the joint impedance (n,) [Nm/rad]; `set_stiffness` changes it."""
         self._arm = memory_of(mj_model, mj_data, own, self.model, self.params, self._ripple_phase)
         self._arm.impedance[:2], self._arm.offset[:] = self._spring_and_damper(self._arm.mass_matrix), self.offset_nm
         # what is added to coloured noise at each step, so that its variance stays that of the sensor
@@ -126,7 +126,7 @@ class ArmInWorld:
 
     @property
     def touching(self) -> bool:
-        """Whether any two things touch, the arm or not."""
+        """True if any two objects touch, the arm or not."""
         return bool(self.mj_data.ncon)
 
     # the port Robot
@@ -308,7 +308,7 @@ class Plant(ArmInWorld):
 
 
 def _known(values: Joints, drawn: FloatArray) -> FloatArray:
-    """What is known of one arm takes the place of what was drawn; the draws are the same either way."""
+    """Replace drawn values by those that are given for one arm; the draws are the same either way."""
     return np.array(values) if values else drawn
 
 

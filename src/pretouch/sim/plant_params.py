@@ -1,4 +1,4 @@
-"""How far the simulated arm is from its model, and how its sensors err: figures of real Pandas."""
+"""Differences of the simulated arm from its model, and errors of its sensors: values of real Pandas."""
 
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
@@ -66,13 +66,13 @@ class PlantParams(Checked):
     bristle_rad: Positive = 0.002
     """Angle over which that friction turns round [rad]: the presliding displacement."""
     stribeck: NonNegative = 0.0
-    """By what part of itself it is larger where the joint barely slides [1]."""
+    """Relative increase where the joint barely slides [1]."""
     stribeck_rad_s: Positive = 0.05
     """Speed at which that has gone [rad/s]."""
     load_friction: NonNegative = 0.0
-    """By what part of a joint's torque its friction grows [1]."""
+    """Increase of a joint's friction with its torque [1]."""
     cold_friction: NonNegative = 0.0
-    """By what part of itself friction is larger in a cold arm [1]."""
+    """Relative increase of friction in a cold arm [1]."""
     warm_up_s: Positive = 900.0
     """Time constant with which an arm warms up [s]."""
     cogging: NonNegative = 0.0
@@ -89,13 +89,13 @@ class PlantParams(Checked):
     cable_n_m: NonNegative = 0.0
     """Stiffness of a cable from a hook above the base to the hand, once it is taut [N/m]; 0: no cable."""
     cable_slack_m: Positive = 0.45
-    """How much longer than the distance at the ready posture it may become before it is taut [m]."""
+    """Increase over the distance at the ready posture at which it becomes taut [m]."""
     cable_kg: NonNegative = 0.0
-    """What of its mass hangs at the hand [kg]."""
+    """Part of its mass that hangs at the hand [kg]."""
     cable_friction_n: NonNegative = 0.0
     """Friction along it [N]."""
     stamp_jitter_s: NonNegative = 0.0
-    """How much later than the truth a state's stamp may be, uniformly [s]."""
+    """Largest delay of a state's stamp, uniform [s]."""
     offsets_nm: Joints = ()
     """Constant error of each torque sensor of one known arm [Nm]; none: drawn up to `torque_offset_nm`."""
     ripple_phases_rad: Joints = ()
@@ -127,7 +127,7 @@ class PlantParams(Checked):
 _SCALED = ("friction_f1_nm", "torque_noise_nm", "torque_offset_nm", "ripple_nm")
 """Torques: they grow with the size of a drive."""
 _KNOWN = ("offsets_nm", "ripple_phases_rad", "mass_factors")
-"""Of one known arm, or empty."""
+"""Fields of one known arm, or empty."""
 _KEPT = ("stiffness_nm_rad", "friction_f2_s_rad", "friction_f3_rad_s", "ripple_cycles")
 _NEVER_BELOW_0 = ("mass_factors", "stiffness_nm_rad", "torque_noise_nm")
 

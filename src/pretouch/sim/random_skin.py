@@ -12,7 +12,7 @@ from pretouch.sensing.unit import SensorUnit
 from pretouch.types import FloatArray
 
 HEIGHT = 0.008
-"""Of the IMU above the surface of its link [m]: on its board, in its case."""
+"""Height of the IMU above the surface of its link [m]: on its board, in its case."""
 
 _TRIES = 1000
 """A place may lie inside a neighbouring capsule of the same link; this often another is drawn."""
@@ -59,12 +59,12 @@ def _random_pose(surface: Capsules, rng: np.random.Generator) -> FloatArray:
 
 @dataclass(frozen=True)
 class Misplacement:
-    """By how much each unit is elsewhere than the controller believes."""
+    """Error of each unit's pose in the controller's skin file."""
 
     position_mm: float = 0.0
     orientation_deg: float = 0.0
-    told: bool = False
-    """Whether the skin file tells the error as standard deviations."""
+    declared: bool = False
+    """True if the skin file declares the error as standard deviations."""
 
 
 def misplaced(skin: Skin, model: RobotModel, error: Misplacement, seed: int) -> tuple[Skin, int]:
@@ -79,7 +79,7 @@ def misplaced(skin: Skin, model: RobotModel, error: Misplacement, seed: int) -> 
         _believed(unit, model, error, np.random.default_rng([seed, 13, k])) for k, unit in enumerate(skin.mounted)
     ]
     units = [unit for unit, _ in believed]
-    if error.told:  # along, and about, one axis of an error that may point anywhere
+    if error.declared:  # along, and about, one axis of an error that may point anywhere
         position, turn = (
             error.position_mm / 1000 / np.sqrt(3.0),
             float(np.radians(error.orientation_deg)) / np.sqrt(3.0),

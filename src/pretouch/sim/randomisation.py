@@ -32,7 +32,7 @@ Params = TypeVar("Params", PlantParams, RangeFinderParams)
 
 
 class FieldSpread(Struct, frozen=True, forbid_unknown_fields=True):
-    """How one field is drawn, in one of three ways."""
+    """Distribution of one field, in one of three forms."""
 
     value: Any = None
     """It has this value."""
@@ -41,12 +41,12 @@ class FieldSpread(Struct, frozen=True, forbid_unknown_fields=True):
     log_uniform: tuple[float, float] | None = None
     """Ends of a range above 0."""
     times: bool = False
-    """Whether the number drawn is a factor on the usual value."""
+    """True if the number drawn is a factor on the default value."""
     each: bool = False
-    """Whether each joint has a draw of its own."""
+    """True if each joint has a draw of its own."""
     source: str = ""
     standard_error: float | list[float] = 0.0
-    """Of what was identified, for who reads the file."""
+    """Standard error of an identified value, for readers of the file."""
 
     def __post_init__(self) -> None:
         if sum(getattr(self, way) is not None for way in _WAYS) != 1:
@@ -58,7 +58,7 @@ class FieldSpread(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def ends(self) -> tuple[float, float] | None:
-        """Of the range, or None of a value."""
+        """Ends of the range, or None for a value."""
         return self.uniform or self.log_uniform
 
     def draw(self, field: str, seed: int, count: int) -> FloatArray:
@@ -76,7 +76,7 @@ class WorldSet(NamedTuple):
     name: str
     about: str
     spreads: dict[str, FieldSpread]
-    """By field, as `plant.mass_error`."""
+    """Distributions by field, as `plant.mass_error`."""
     digest: str
     """SHA-256 of the file."""
 
@@ -87,7 +87,7 @@ class DrawnWorld(NamedTuple):
     plant: PlantParams
     ranging: RangeFinderParams
     misplaced: Misplacement
-    """By how much each unit sits elsewhere than the controller believes."""
+    """Error of each unit's pose in the controller's skin file."""
 
 
 def with_own(world: Params, own: Params, usual: Params) -> Params:
@@ -115,7 +115,7 @@ def world_set(name: str) -> WorldSet:
 
 
 def _spreads(place: Path, table: dict[str, Any]) -> Iterator[tuple[str, FieldSpread]]:
-    """How the fields of a file's tables are drawn."""
+    """Yield the distribution of each field of a file's tables."""
     for part, entries in table.items():
         if part not in _PARTS or not isinstance(entries, dict):
             raise ParameterError(f"{place} has an unknown table {part!r}: use about, {', '.join(_PARTS)}.")

@@ -19,7 +19,7 @@ from pretouch.types import FloatArray, RangeReadings, RangeStatus
 
 @dataclass(frozen=True)
 class RangeFinderParams(Checked):
-    """How the sensors of a skin err."""
+    """Errors of a skin's sensors."""
 
     mode: Literal["short", "long"] = "short"
     """Distance mode."""
@@ -66,7 +66,7 @@ class RangeSample(NamedTuple):
     unit: int
     """Index of the unit in the skin."""
     time: float
-    """When it was measured [s]."""
+    """Time of the measurement [s]."""
     distance: float
     """[m]; 0 without a target."""
     status: int

@@ -22,7 +22,7 @@ _MARGIN_M2 = 1e-9
 class Geoms(NamedTuple):
     """The visible geoms (G,) of a scene, in MuJoCo's memory."""
 
-    seen: IntArray  # (V,) those that are visible
+    visible: IntArray  # (V,) those that are visible
     kind: IntArray  # (G,) plane, sphere, capsule, box, mesh and so on
     body: IntArray  # (G,)
     size: FloatArray  # (G, 3)
@@ -96,7 +96,7 @@ def cast(
     """
     nearest, normal, struck = np.full(len(rays), -1.0), np.zeros_like(rays), np.zeros(len(rays), np.int64)
     to, there = np.empty(3), np.empty(3)
-    for geom in geoms.seen:
+    for geom in geoms.visible:
         if geoms.body[geom] == without:
             continue
         reach, bounded = geoms.reach[geom], geoms.reach[geom] > 0.0
@@ -118,7 +118,7 @@ def cast(
 
 
 class Finders(NamedTuple):
-    """Where K sensors sit, and on what; and how the type of each measures."""
+    """Poses and links of K sensors, and the properties of each type."""
 
     position: FloatArray  # (L, 3) origins of the bodies [m], in MuJoCo's memory
     rotation: FloatArray  # (L, 9) rows of their rotation matrices

@@ -1,4 +1,4 @@
-"""What stands in the simulated room: the arm on its pedestal, a floor, static objects and a hand."""
+"""Simulated room: the arm on its pedestal, a floor, static objects and a hand."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +15,7 @@ from pretouch.types import FloatArray
 CONTACTS = "contacts"
 """Name of the sensor that counts the contacts of a scene."""
 ARM_STIFFNESS = 100_000.0
-"""Of two arms' contacts with each other, stiff covers on both [N/m]; an assumption."""
+"""Stiffness of two arms' contacts with each other, stiff covers on both [N/m]; an assumption."""
 _IMPEDANCE = 0.01
 """Constant solver impedance d of all contacts; with it and an elliptic cone solref means N/m, see `stiffen`."""
 
@@ -59,7 +59,7 @@ class GhostSpec:
 
 @dataclass(frozen=True)
 class BasePose:
-    """Where an arm stands, upright, in the base frame of another."""
+    """Position of an arm, upright, in the base frame of another."""
 
     position: tuple[float, float, float]
     """[m]"""
@@ -84,7 +84,7 @@ class SecondArmSpec:
 
 @dataclass(frozen=True)
 class SceneSpec:
-    """What to build round the arm."""
+    """Objects to build round the arm."""
 
     boxes: tuple[Box, ...] = ()
     hand: HandSpec | None = None
@@ -110,7 +110,7 @@ def described(spec: SceneSpec) -> dict[str, object]:
 
 
 def fixtures(spec: SceneSpec) -> Fixtures:
-    """What of a scene is declared to the controller: floor and pedestal, not the objects."""
+    """Return the fixtures that a controller is given: floor and pedestal, not the objects."""
     return floor_and_pedestal(spec.floor_height, spec.pedestal_radius)
 
 
@@ -120,10 +120,10 @@ _HOOK_M = (0.0, 0.0, 1.4)
 
 @dataclass(frozen=True)
 class ArmError:
-    """How the simulated arm differs from its model."""
+    """Differences of the simulated arm from its model."""
 
     params: PlantParams
-    """Of the kind of arm: rotor inertia and cable."""
+    """Parameters of the kind of arm: rotor inertia and cable."""
     mass_factor: FloatArray
     """(L,) factor on each link's mass and inertia."""
     payload: float

@@ -48,7 +48,7 @@ class Pushes:
 
     @property
     def under_way(self) -> bool:
-        """Whether one is due or lasts."""
+        """True if a push is due or lasts."""
         return any(push.start + push.duration > self.now for push in self._pushes)
 
     def add(self, push: TcpPush) -> None:

@@ -16,7 +16,7 @@ from pretouch.types import RangeReadings, TouchReadings, TouchStatus
 
 @dataclass(frozen=True)
 class TouchErrors(Checked):
-    """How touch sensors err. Figures of the FSR 402 (Interlink, data sheet of the 400 series) where it has them."""
+    """Errors of touch sensors. Values of the FSR 402 (Interlink, data sheet of the 400 series) where it has them."""
 
     period_s: Positive = 0.02
     """Time between readings [s]: a unit sends 50 times a second."""
@@ -34,7 +34,7 @@ class TouchErrors(Checked):
     noise_floor_n: NonNegative = 0.03
     """Standard deviation without a force [N]: an assumption."""
     hysteresis: Fraction = 0.1
-    """By what fraction a force that falls reads too high: 10 %."""
+    """Fraction by which a falling force reads too high: 10 %."""
     release: Fraction = 0.7
     """Part of the smallest force below which a touch is over, so that noise does not make it begin again and again:
     as in the firmware."""
@@ -51,12 +51,12 @@ class TouchErrors(Checked):
 
 
 class TouchSample(NamedTuple):
-    """What a sensor says of one measurement."""
+    """One measurement of a sensor."""
 
     unit: int
     """Index of the unit in the skin."""
     time: float
-    """When it was measured [s]."""
+    """Time of the measurement [s]."""
     contact: bool
     force: float
     """[N], NaN of a sensor that tells contact only."""

@@ -1,4 +1,4 @@
-"""What was sent and nobody has received yet."""
+"""Messages that were sent and not received yet."""
 
 import heapq
 from collections.abc import Iterator

@@ -14,7 +14,7 @@ _BASE = "base"
 _PHYSICS = ("gravity", "wind", "density", "viscosity", "disableflags")
 """Options that change what happens, and not how well it is computed."""
 _NEVER_MOVED = {"nu": "actuators", "nflex": "deformable bodies", "nplugin": "plugins"}
-"""What nobody here would move, or see."""
+"""Parts that the simulation neither moves nor shows."""
 _VISUAL = ("global_", "quality", "headlight", "map", "scale", "rgba")
 _SIZES = ("memory", "njmax", "nconmax", "nstack", "nuserdata")
 _UPRIGHT = 1e-6
