@@ -63,7 +63,7 @@ def test_a_pose_that_no_skin_file_could_hold_is_drawn_again_and_counted(panda_mo
 
 
 def test_a_skin_file_that_tells_its_error_does_so_as_a_deviation_per_axis(panda_model, paper_skin):
-    told, _ = misplaced(paper_skin, panda_model, Misplacement(3.0, 0.5, told=True), seed=1)
+    told, _ = misplaced(paper_skin, panda_model, Misplacement(3.0, 0.5, declared=True), seed=1)
     untold, _ = misplaced(paper_skin, panda_model, Misplacement(3.0, 0.5), seed=1)
     assert np.array_equal(told.T_link_sensor, untold.T_link_sensor)
     count = len(paper_skin)

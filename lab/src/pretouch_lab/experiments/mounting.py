@@ -28,7 +28,7 @@ UNTOLD = (
     *(Misplacement(orientation_deg=size) for size in (1.0, 2.0, 5.0, 20.0)),
     Misplacement(*_CALIBRATED),
 )
-TOLD = tuple(Misplacement(*both, told=True) for both in (_CALIBRATED, *_LARGE))
+TOLD = tuple(Misplacement(*both, declared=True) for both in (_CALIBRATED, *_LARGE))
 AVOIDED = (Misplacement(), *(Misplacement(*both) for both in _LARGE))
 """These once more with restrictions that keep the arm off the board."""
 _STIFFNESS_N_PER_M = 25_000.0
@@ -43,7 +43,7 @@ def cells(options: Options) -> list[Row]:
             "side": side,
             "position_mm": error.position_mm,
             "orientation_deg": error.orientation_deg,
-            "told": "told" if error.told else "untold",
+            "told": "told" if error.declared else "untold",
             **controller,
         }
         for mode, errors, sides in (
