@@ -12,7 +12,7 @@ from pretouch_lab.cli import benchmarks
 from pretouch_lab.domain_randomisation import Parts, folder_part, randomised, sentence
 from pretouch_lab.experiment import arguments, context_of
 from pretouch_lab.experiments import static
-from pretouch_lab.options import Detection, Options
+from pretouch_lab.options import DetectionOptions, TrialOptions
 from pretouch_lab.run import open_run
 
 MODEL = RobotModel(panda())
@@ -38,33 +38,34 @@ def test_a_world_changes_arm_sensors_and_what_is_believed_of_the_skin():
 
 
 def test_the_nominal_world_plays_as_the_usual_one():
-    context, cell = context_of("", "", ""), static.cells(Options())[0]
+    context, cell = context_of("", "", ""), static.cells(TrialOptions())[0]
     usual, _ = static.trial(cell, 1003, context)
     assert static.trial(cell, 1003, replace(context, world="nominal"))[0] == usual
     assert static.trial(cell, 1003, replace(context, world="realistic"))[0] != usual
 
 
 def test_runs_of_two_worlds_do_not_share_a_folder(tmp_path):
-    open_run(tmp_path / "a", arguments("static", Options()))
+    open_run(tmp_path / "a", arguments("static", TrialOptions()))
     with pytest.raises(ExperimentError, match="holds a run with world = '', not 'stress'"):
-        open_run(tmp_path / "a", arguments("static", Options(world="stress")))
+        open_run(tmp_path / "a", arguments("static", TrialOptions(world="stress")))
     out = str(tmp_path / "b")
-    benchmarks._folder(Detection(out=out, world="stress"), "detection")
+    benchmarks._folder(DetectionOptions(out=out, world="stress"), "detection")
     with pytest.raises(ExperimentError, match="holds a run with world = 'stress', not ''"):
-        benchmarks._folder(Detection(out=out), "detection")
+        benchmarks._folder(DetectionOptions(out=out), "detection")
 
 
 def test_a_world_file_that_changed_is_another_world(tmp_path):
     place = tmp_path / "mine.toml"
     place.write_text("[plant.mass_error]\nvalue = 0.1\n")
-    open_run(tmp_path / "run", arguments("static", Options(world=str(place))))
+    open_run(tmp_path / "run", arguments("static", TrialOptions(world=str(place))))
     place.write_text("[plant.mass_error]\nvalue = 0.2\n")
     with pytest.raises(ExperimentError, match="holds a run with world_sha256 = "):
-        open_run(tmp_path / "run", arguments("static", Options(world=str(place))))
+        open_run(tmp_path / "run", arguments("static", TrialOptions(world=str(place))))
 
 
 def test_folders_are_named_by_their_world(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert benchmarks._folder(Detection(world="stress", quick=True), "detection").name == "bench-detection-stress-quick"
-    assert benchmarks._folder(Detection(), "detection").name == "bench-detection"
+    stressed = benchmarks._folder(DetectionOptions(world="stress", quick=True), "detection")
+    usual = benchmarks._folder(DetectionOptions(), "detection")
+    assert (stressed.name, usual.name) == ("bench-detection-stress-quick", "bench-detection")
     assert folder_part("here/arm.toml") != folder_part("there/arm.toml")

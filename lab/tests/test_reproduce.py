@@ -14,12 +14,13 @@ from pretouch_lab import experiment as lab_experiment
 from pretouch_lab.cli.reproducing import whole_paper
 from pretouch_lab.experiment import NAMES, arguments, controllers, experiment, play, recording_file
 from pretouch_lab.experiments import between, static
-from pretouch_lab.options import Options, Playing
+from pretouch_lab.options import Playing, TrialOptions
 from pretouch_lab.run import CLUSTER, open_run
 
 
 def test_cells_are_all_values_for_each_controller_that_the_experiment_is_about():
-    options, sensing = Options(profiles=("blind", "paper", "pretouch")), [("paper", "slack"), ("pretouch", "braking")]
+    options = TrialOptions(profiles=("blind", "paper", "pretouch"))
+    sensing = [("paper", "slack"), ("pretouch", "braking")]
     hands, arms = ([tuple(each.values()) for each in experiment(n).cells(options)] for n in ("avoidance", "two-arms"))
     assert hands == [(place, *own) for place in ("beside", "inside") for own in (("blind", "off"), *sensing)]
     assert arms == [(knows, *own) for own in sensing for knows in ("blind", "seen", "told")]
@@ -27,7 +28,7 @@ def test_cells_are_all_values_for_each_controller_that_the_experiment_is_about()
 
 def test_each_profile_has_its_modes():
     def pairs(own, **options):
-        return [tuple(cell.values()) for cell in controllers(Options(**options), own)]
+        return [tuple(cell.values()) for cell in controllers(TrialOptions(**options), own)]
 
     profiles = ("blind", "paper", "paper:approach.rows=floor")
     assert pairs("off", profiles=profiles, restrictions=("slack", "hard")) == [
@@ -39,7 +40,7 @@ def test_each_profile_has_its_modes():
 def test_plays_are_all_cells_seed_by_seed_and_their_recordings_differ(tmp_path):
     odd = ("blind", "paper", "paper:approach.beta=-10", "paper:window.alpha=0.3", "paper:approach.slack_weight=1e+3")
     for name in NAMES:
-        plays = experiment(name).plays(Options(2, 3, odd, ("off", "hard"), (2e3, 25e3)))
+        plays = experiment(name).plays(TrialOptions(2, 3, odd, ("off", "hard"), (2e3, 25e3)))
         assert [seed for _, seed in plays] == [3] * (len(plays) // 2) + [4] * (len(plays) // 2)
         files = {recording_file(tmp_path, *each).name for each in plays}
         assert len(files) == len(plays)
@@ -47,12 +48,11 @@ def test_plays_are_all_cells_seed_by_seed_and_their_recordings_differ(tmp_path):
 
 
 def test_the_whole_paper_runs_every_experiment_and_no_trial_twice():
-    plays = [
-        (name, str(cell), seed) for _, name, o in whole_paper(Options(2)) for cell, seed in experiment(name).plays(o)
-    ]
+    parts = [(name, options) for _, name, options in whole_paper(TrialOptions(2))]
+    plays = [(name, str(cell), seed) for name, options in parts for cell, seed in experiment(name).plays(options)]
     assert len(plays) == len(set(plays))
     assert {name for name, _, _ in plays} == set(NAMES)
-    parts = whole_paper(Options(1, profiles=("paper",), restrictions=("slack",), stiffness=(2e3,)))
+    parts = whole_paper(TrialOptions(1, profiles=("paper",), restrictions=("slack",), stiffness=(2e3,)))
     assert len({where for where, _, _ in parts}) == len(parts)
     cells = [cell for _, name, options in parts if name == "static" for cell in static.cells(options)]
     found = [(cell["profile"], cell["restrictions"], cell["stiffness_n_per_m"]) for cell in cells]
@@ -64,7 +64,7 @@ def test_a_changed_skin_file_is_noticed(tmp_path, monkeypatch, own):
     file, out = tmp_path / "skin.toml", tmp_path / "out"
     file.write_bytes(PAPER_SKIN.read_bytes())
     monkeypatch.setattr(lab_experiment, "skin_file", lambda _arm: file)
-    options = Options(1, skin=str(file) if own else "")
+    options = TrialOptions(1, skin=str(file) if own else "")
     open_run(out, arguments("static", options))
     open_run(out, arguments("static", replace(options, seeds=2)))  # more of the same
     file.write_bytes(PAPER_SKIN.read_bytes().replace(b"-0.108", b"-0.109"))
@@ -83,7 +83,7 @@ def test_the_trials_that_are_wanted_are_recorded(tmp_path, monkeypatch, record, 
         return {"measured": seed}, None
 
     monkeypatch.setattr(static, "EXPERIMENT", replace(static.EXPERIMENT, trial=played))
-    options = Options(2, record=record)
+    options = TrialOptions(2, record=record)
     cell = static.cells(options)[0]
     (tmp_path / "recordings").mkdir()
     recording_file(tmp_path, cell, 0).with_suffix(".unfinished").write_text("of a killed worker")
@@ -103,7 +103,7 @@ def test_a_schedulers_workers_are_told_whole_paths(tmp_path, monkeypatch):
 
 def test_rows_of_a_world_say_it(tmp_path, monkeypatch):
     monkeypatch.setattr(static, "EXPERIMENT", replace(static.EXPERIMENT, trial=lambda *_: ({}, None)))
-    rows = [play("static", Options(world=world), tmp_path, {"place": "here"}, 1) for world in ("", "stress")]
+    rows = [play("static", TrialOptions(world=world), tmp_path, {"place": "here"}, 1) for world in ("", "stress")]
     assert rows == [{}, {"world": "stress"}]
 
 

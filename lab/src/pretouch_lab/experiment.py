@@ -26,7 +26,7 @@ from pretouch.sim.randomisation import world_set
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import SceneSpec
 from pretouch.text_table import TextTable
-from pretouch_lab.options import Options
+from pretouch_lab.options import TrialOptions
 from pretouch_lab.run import Play, Row, plays_of
 from pretouch_lab.trial import Record, Setup, Trace
 
@@ -101,7 +101,7 @@ class Experiment:
     """Cells to run, how to play a trial of one, and what to make of the rows that come out."""
 
     name: str
-    cells: Callable[[Options], list[Row]]
+    cells: Callable[[TrialOptions], list[Row]]
     trial: Callable[[Row, int, Context], tuple[Row, Record | None]]
     """Plays the trial of a cell with a seed; returns what is measured, and its course if the figure may want it."""
     tables: Callable[[list[Row]], list[TextTable]]
@@ -110,7 +110,7 @@ class Experiment:
     any_arm: bool = False
     """Whether it can be played with another arm than the Panda."""
 
-    def plays(self, options: Options) -> list[Play]:
+    def plays(self, options: TrialOptions) -> list[Play]:
         """Return all trials, seed by seed; an ExperimentError if there is none."""
         cells = self.cells(options)
         if not cells:
@@ -136,7 +136,7 @@ def modes() -> dict[str, dict[str, str]]:
     return {"off": {"approach": "none"}} | rows | parts
 
 
-def controllers(options: Options, restrictions: str) -> list[Row]:
+def controllers(options: TrialOptions, restrictions: str) -> list[Row]:
     """Return profiles with restriction modes; `restrictions` is the experiment's own.
 
     Without proximity the mode is `off`; a profile that is named with a mode keeps it, and so does one whose mode is not
@@ -157,7 +157,7 @@ def first_sensing(rows: list[Row]) -> list[Row]:
     return ([row for row in rows if profile(row["profile"]).perception is not None] or rows)[:1]
 
 
-def check(options: Options, names: Sequence[str]) -> None:
+def check(options: TrialOptions, names: Sequence[str]) -> None:
     """Raise an error of this package for options with which experiments cannot be played."""
     others = [name for name in names if not experiment(name).any_arm]
     if options.arm and others:
@@ -190,7 +190,7 @@ def context_of(arm: str, skin: str, world: str) -> Context:
     return Context(model, skin_for(model, skin), placement_for(model), world)
 
 
-def arguments(name: str, options: Options) -> Row:
+def arguments(name: str, options: TrialOptions) -> Row:
     """Return what rows depend on, for `run.open_run`: the options, and digests of the files that they only name."""
     arm = robot_named(options.arm or "panda")
     file = Path(options.skin or skin_file(arm))
@@ -203,11 +203,11 @@ def arguments(name: str, options: Options) -> Row:
     if options.world:
         digests["world_sha256"] = world_set(options.world).digest
     # rows say their seeds, so that a folder may be given more of them
-    own = {each.name: getattr(options, each.name) for each in fields(Options) if "seed" not in each.name}
+    own = {each.name: getattr(options, each.name) for each in fields(TrialOptions) if "seed" not in each.name}
     return {"experiment": name, **own, **digests}
 
 
-def play(name: str, options: Options, out: Path, cell: Row, seed: int) -> Row:
+def play(name: str, options: TrialOptions, out: Path, cell: Row, seed: int) -> Row:
     """Play one trial, and record it in a folder if it is to be recorded; return what is measured."""
     what, context = experiment(name), context_of(options.arm, options.skin, options.world)
     place = recording_file(out, cell, seed)

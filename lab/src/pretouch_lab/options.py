@@ -11,7 +11,7 @@ from pretouch.cli.options import Counts, JsonFile, Numbers, Words
 
 
 @dataclass(frozen=True)
-class Options:
+class TrialOptions:
     """Which trials of an experiment."""
 
     seeds: int = 12
@@ -105,7 +105,7 @@ class InWorlds(Published):
 
 
 @dataclass(frozen=True)
-class Detection(InWorlds):
+class DetectionOptions(InWorlds):
     """Hold contact detectors against each other: delay against false alarms, what they miss, forces on a board.
 
     About half an hour on two processors, with --quick two minutes. A run that was stopped goes on with the same --out.
@@ -113,7 +113,7 @@ class Detection(InWorlds):
 
 
 @dataclass(frozen=True)
-class Avoidance(InWorlds):
+class AvoidanceOptions(InWorlds):
     """How near arms come to people and objects, with what forces, and what it costs to keep clear of them.
 
     About ten minutes on two processors, with --quick one. A run that was stopped goes on with the same --out.
@@ -130,7 +130,7 @@ class Avoidance(InWorlds):
 
 
 @dataclass(frozen=True)
-class Localization(Published):
+class LocalizationOptions(Published):
     """Hold where contacts are said to be against where they are: links, places, two at once; with skins and without.
 
     About twenty minutes on two processors, with --quick three. A run that was stopped goes on with the same --out.
@@ -138,7 +138,7 @@ class Localization(Published):
 
 
 @dataclass(frozen=True)
-class Shield(Published):
+class ShieldOptions(Published):
     """Hold filters between a commander and the arm against each other: what holds whoever commands, and what it costs.
 
     About ten minutes on two processors, with --quick one. A run that was stopped goes on with the same --out.
@@ -146,7 +146,7 @@ class Shield(Published):
 
 
 @dataclass(frozen=True)
-class Both(InWorlds):
+class BothOptions(InWorlds):
     """Run the benchmarks detection and avoidance, and say which goals were reached.
 
     About 40 minutes on two processors, with --quick three minutes. A run that was stopped goes on with the same --out.
@@ -154,7 +154,7 @@ class Both(InWorlds):
 
 
 @dataclass(frozen=True)
-class Real(Playing):
+class RealOptions(Playing):
     """Contact detectors on public recordings of real arms, which you download: false alarms, contacts, delays, links.
 
     One half of each set's recordings says what load, offsets and friction the arm has, the other is judged; then the
@@ -168,7 +168,7 @@ class Real(Playing):
 
 
 @dataclass(frozen=True)
-class Calibration(Playing):
+class CalibrationOptions(Playing):
     """How far units on random skins are found from where they sit, by `pretouch skin calibrate` in simulation."""
 
     skins: int = 20
@@ -183,7 +183,7 @@ class Calibration(Playing):
 
 
 @dataclass(frozen=True)
-class Cycle:
+class CycleOptions:
     """How long a control step takes: processor and wall time at a rate, and overruns."""
 
     points: Counts = (7, 32, 128, 1000)

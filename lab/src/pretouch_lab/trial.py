@@ -130,7 +130,7 @@ def trace_of(record: Record) -> RunRecord:
     return RunRecord(**columns_of(record.steps), contacts=contacts, truth=truth)
 
 
-class _Recorder:
+class _TrialRecorder:
     """Keeps each step, and where the hand was; all of it in a recording too, if there is one."""
 
     def __init__(self, plant: Plant, hand: Hand | None, recording: Recording | None) -> None:
@@ -153,7 +153,7 @@ class _Recorder:
         return truth_of(forces, touches, self.hand_position[-1])
 
 
-class Simulation:
+class SimulatedTrial:
     """The arm of a setup in its scene under its controller: it stands, and its observer's transient is over."""
 
     def __init__(self, setup: Setup) -> None:
@@ -183,12 +183,12 @@ class Simulation:
 
 def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
     """Run a trial until `done` says so of a step. A recording that could not be kept whole is a RecordingError."""
-    made = Simulation(setup)
+    made = SimulatedTrial(setup)
     plant, about = made.plant, {"seed": setup.seed, "scene": described(setup.scene)}
     if setup.world:
         about["world"] = setup.world
     with Recording(setup.recording, made.controller, about) if setup.recording else nullcontext() as recording:
-        recorder = _Recorder(plant, made.hand, recording)
+        recorder = _TrialRecorder(plant, made.hand, recording)
         options = Options(desired=setup.commander(plant, made.hand)) if setup.commander else None
         made.run(recorder, lambda step: done(step, plant), options)
     if recording and recording.trouble:

@@ -11,7 +11,7 @@ from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.scene import SceneSpec
 from pretouch_lab.experiments import mounting
 from pretouch_lab.experiments.mounting import ROOM, tables
-from pretouch_lab.options import Options
+from pretouch_lab.options import TrialOptions
 from pretouch_lab.trial import Setup, play
 
 
@@ -21,14 +21,14 @@ def cell(side: str = "+y", position: float = 0.0, orientation: float = 0.0, told
 
 
 def test_cells_are_all_errors_at_all_places_of_each_profile_that_senses():
-    cells = mounting.cells(Options())
+    cells = mounting.cells(TrialOptions())
     assert {cell["profile"] for cell in cells} == {"paper"}
     off = [cell for cell in cells if cell["restrictions"] == "off" and cell["told"] == "untold"]
     assert len(off) == 6 * len(mounting.UNTOLD)
     positions, angles = [(size, 0) for size in (5, 10, 20, 50)], [(0, size) for size in (1, 2, 5, 20)]
     assert {(cell["position_mm"], cell["orientation_deg"]) for cell in off} == {(0, 0), *positions, *angles, (3, 0.5)}
     assert {cell["side"] for cell in cells if cell["restrictions"] == "hard"} == {"-y", "+y"}
-    asked = mounting.cells(Options(restrictions=("slack",)))  # in place of both
+    asked = mounting.cells(TrialOptions(restrictions=("slack",)))  # in place of both
     assert {cell["restrictions"] for cell in asked} == {"slack"}
     assert len({str(cell) for cell in asked}) == len(asked)
 

@@ -8,7 +8,7 @@ from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sim.observer import observe, observer_init
 from pretouch.sim.plant_params import PlantParams
-from pretouch_lab.identification.identify import Identified, Quantity
+from pretouch_lab.identification.identify import IdentifiedArm, Quantity
 from pretouch_lab.identification.recording import ArmSamples
 
 MODEL = RobotModel(panda())
@@ -64,12 +64,12 @@ def free_motion(made: Made = Made(), seconds: float = 60.0, seed: int = 5, every
     return ArmSamples(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def row(found: Identified, field: str) -> Quantity:
+def row(found: IdentifiedArm, field: str) -> Quantity:
     """What was identified of a field of the joints."""
     return next(each for each in found.of_joints() if each.field == field)
 
 
-def sigmas_off(found: Identified, column: int, truth: np.ndarray) -> float:
+def sigmas_off(found: IdentifiedArm, column: int, truth: np.ndarray) -> float:
     """By how many of its standard errors that joint is off which is worst in a column of the joints' numbers."""
     own, errors = (found.fit.of_joints(part)[:, column] for part in (found.fit.numbers, found.fit.errors))
     return float((np.abs(own - truth) / errors).max())

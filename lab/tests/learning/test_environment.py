@@ -8,7 +8,7 @@ from pretouch.profiles import profile
 from pretouch.types import Mode
 from pretouch_lab.bench.avoidance_scenes import scenarios
 from pretouch_lab.learning import REACH
-from pretouch_lab.learning.environment import ALONE, CYCLES, ReachEnv, Reward, Scene
+from pretouch_lab.learning.environment import ALONE, CYCLES, ReachEnv, ReachScene, Reward
 
 TOWARDS_Y = np.array([0, 1, 0, 0, 0, 0], np.float32)
 
@@ -109,7 +109,7 @@ def test_an_action_has_the_stamp_of_the_step_it_was_observed_at_and_never_goes_s
 
 @pytest.mark.parametrize("name", ["inside", "line +y"])
 def test_a_goal_is_on_the_path_away_from_the_hand_and_from_what_stands_there(name):
-    scene, rng = Scene(scenarios()[name], profile(ALONE), "paper", 5), np.random.default_rng(0)
+    scene, rng = ReachScene(scenarios()[name], profile(ALONE), "paper", 5), np.random.default_rng(0)
     for _ in range(50):
         goal = scene.goal(rng)
         assert np.linalg.norm(goal - scene.ee_position) > 0.2

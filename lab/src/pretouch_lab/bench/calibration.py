@@ -140,13 +140,13 @@ def _followed(plant: Plant, model: RobotModel, plan: Plan) -> tuple[JointTrace, 
     commander = PlanCommander(controller, plan, lambda: plant.time)
     states: list[tuple[float, FloatArray]] = []
 
-    class Recorder:
+    class JointRecorder:
         def record(self, cycle: Cycle) -> None:
             if commander.begin is not None:
                 states.append((cycle.inputs.robot.stamp, np.array(cycle.inputs.robot.q)))
 
     clock = PlantClock(plant, controller.limits.period)
-    run(controller, plant, NoUnits(), clock, Recorder(), commander.done, Options(desired=commander))
+    run(controller, plant, NoUnits(), clock, JointRecorder(), commander.done, Options(desired=commander))
     if commander.stopped or commander.begin is None:
         raise ExperimentError(f"The simulated arm did not follow the plan to its end. {commander.stopped}")
     return JointTrace(np.array([stamp for stamp, _ in states]), np.array([q for _, q in states])), commander.begin

@@ -11,7 +11,7 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.types import FloatArray
 from pretouch_lab.bench.contacts import Toucher, Touching, last_s, place_on
 from pretouch_lab.bench.dense_skin import gap
-from pretouch_lab.bench.motions import Motion, motion_of
+from pretouch_lab.bench.motions import LoadedMotion, motion_of
 from pretouch_lab.bench.scenes import ArmCell, model, path_of, scenario, sensing_of
 from pretouch_lab.bench.streams import AWAY, PROFILE, Alone, Stream, record_moved
 from pretouch_lab.replay import Place
@@ -48,7 +48,7 @@ def hard_stream(arm: ArmCell, seed: int) -> tuple[Stream, list[Touching]]:
     return record_moved(what, prepare, motion.course.command), touches
 
 
-def _gripping(plant: Plant, motion: Motion) -> Callable[[float], float]:
+def _gripping(plant: Plant, motion: LoadedMotion) -> Callable[[float], float]:
     """Return what has the arm grip and put down its loads when it is time."""
     waiting = list(motion.loads)
 
@@ -60,7 +60,7 @@ def _gripping(plant: Plant, motion: Motion) -> Callable[[float], float]:
     return grip
 
 
-def _beside(motion: Motion, seed: int) -> FloatArray:
+def _beside(motion: LoadedMotion, seed: int) -> FloatArray:
     """Draw a place (3,) [m] for somebody beside a motion: where none is as near as wanted, the best that was drawn."""
     near, rng, body = scenario("hard")["near"], np.random.default_rng([seed, 62]), model().body
     times = np.linspace(0.0, float(motion.course.start[-1]), _LOOKED_AT)
@@ -78,7 +78,7 @@ def _beside(motion: Motion, seed: int) -> FloatArray:
     return found
 
 
-def _touched(motion: Motion, number: int, seed: int) -> list[Touching]:
+def _touched(motion: LoadedMotion, number: int, seed: int) -> list[Touching]:
     """Draw the contacts of an arm: the seed says where, how and when."""
     family, rng, arm = scenario("hard"), np.random.default_rng([seed, 63]), model()
     chosen, hand = family["contact"], scenario("contacts")["hand"]

@@ -79,7 +79,7 @@ def is_free(q: FloatArray) -> bool:
 
 
 @dataclass(frozen=True)
-class Motion:
+class LoadedMotion:
     """What an arm does, and the loads that it grips and puts down meanwhile."""
 
     course: Wandering
@@ -87,12 +87,12 @@ class Motion:
     """From each time on [s] what it carries [kg]."""
 
 
-def motion_of(name: str, seed: int, until: float) -> Motion:
+def motion_of(name: str, seed: int, until: float) -> LoadedMotion:
     """Draw a motion of the scenario file by its name for so long [s]; the seed says which."""
     rng = np.random.default_rng([seed, 61])
     if name in ("pick-and-place", "untold-load"):
         return _pick_and_place(scenario("hard")["motion"][name], rng, until)
-    return Motion(_course(scenario("hard")["motion"][name], _NEXT[name], rng, until))
+    return LoadedMotion(_course(scenario("hard")["motion"][name], _NEXT[name], rng, until))
 
 
 def wandering(seed: int, until: float) -> Wandering:
@@ -157,7 +157,7 @@ _NEXT: dict[str, Next] = {
 }  # fmt: skip
 
 
-def _pick_and_place(chosen: dict[str, Any], rng: Rng, until: float) -> Motion:
+def _pick_and_place(chosen: dict[str, Any], rng: Rng, until: float) -> LoadedMotion:
     """Go to and fro between two places, take something at one and put it down at the other."""
     hand, arm = model().ee, model()
     places = [
@@ -180,4 +180,4 @@ def _pick_and_place(chosen: dict[str, Any], rng: Rng, until: float) -> Motion:
             if number in (1, 4):
                 loads.append((at + duration[-1] + 0.5 * rest, kg if number == 1 else 0.0))
             at += duration[-1] + rest
-    return Motion(Wandering(np.array(q), np.array(start), np.array(duration)), tuple(loads))
+    return LoadedMotion(Wandering(np.array(q), np.array(start), np.array(duration)), tuple(loads))

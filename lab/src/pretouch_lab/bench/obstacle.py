@@ -28,7 +28,7 @@ class Nearest(NamedTuple):
     """(3,) unit vector from there to the obstacle."""
 
 
-class Shape(Protocol):
+class ObstacleShape(Protocol):
     """The surface of an obstacle."""
 
     def closest(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -36,7 +36,7 @@ class Shape(Protocol):
         ...
 
 
-ShapeAt = Callable[[FloatArray], Shape]
+ShapeAt = Callable[[FloatArray], ObstacleShape]
 """An obstacle's surface, given where the person's hand is (..., 3) [m]."""
 
 
@@ -50,7 +50,7 @@ class Ball:
     """[m]"""
 
     def closest(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See `Shape`."""
+        """See `ObstacleShape`."""
         to = self.center - points
         size = np.linalg.norm(to, axis=-1)
         return size - self.radius, to / np.maximum(size, 1e-12)[..., None]
@@ -66,7 +66,7 @@ class Cuboid:
     """(3,) [m]"""
 
     def closest(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See `Shape`; from inside, the direction is towards the middle."""
+        """See `ObstacleShape`; from inside, the direction is towards the middle."""
         rel = self.center - points
         beyond = np.abs(rel) - self.half_size
         outside = np.maximum(beyond, 0.0) * np.sign(rel)
@@ -77,7 +77,7 @@ class Cuboid:
         return np.where(inside, beyond.max(axis=-1), size), to
 
 
-def nearest(kin: Kinematics, body: Capsules, shape: Shape) -> Nearest:
+def nearest(kin: Kinematics, body: Capsules, shape: ObstacleShape) -> Nearest:
     """Find the closest points of an arm's capsules and an obstacle."""
     _, a, b, _ = placed(body, kin)
     along = a + _ALONG * (b - a)

@@ -24,7 +24,7 @@ from pretouch.sim.scene import GhostSpec, SceneSpec
 from pretouch.types import ControlStep, FloatArray, IntArray, Mode, Obstacles, RobotState, no_obstacles
 from pretouch_lab.bench.scenes import Sensing, model
 from pretouch_lab.replay import Ghost, Place
-from pretouch_lab.trial import Setup, Simulation
+from pretouch_lab.trial import Setup, SimulatedTrial
 
 PROFILE = "paper:detect.f_base_n=1000:slow=none:approach=none:perception.closing=on:perception.self_aside_m=0.005"
 """Of the arms that are recorded: proximity is sensed, but no force is a contact and nothing near changes the motion.
@@ -149,10 +149,10 @@ class Alone:
     controller: Callable[..., Controller] = Controller
     """Makes its controller, as `Controller` is made."""
 
-    def simulation(self, prepare: Callable[[Plant, RangeFinders], object]) -> Simulation:
+    def simulation(self, prepare: Callable[[Plant, RangeFinders], object]) -> SimulatedTrial:
         """Build it."""
         own, sensing, start = profile(PROFILE), self.sensing, (float(AWAY[0]), float(AWAY[1]), float(AWAY[2]))
-        return Simulation(
+        return SimulatedTrial(
             Setup(
                 model(),
                 sensing.skin if sensing else Skin((), model()),

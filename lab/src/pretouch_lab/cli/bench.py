@@ -13,14 +13,14 @@ class Bench:
     """Measure something: detectors, ways to avoid people, places of contacts, or a step's time."""
 
     what: (
-        Annotated[options.Detection, tyro.conf.subcommand("detection")]
-        | Annotated[options.Avoidance, tyro.conf.subcommand("avoidance")]
-        | Annotated[options.Localization, tyro.conf.subcommand("localization")]
-        | Annotated[options.Shield, tyro.conf.subcommand("shield")]
-        | Annotated[options.Both, tyro.conf.subcommand("both")]
-        | Annotated[options.Cycle, tyro.conf.subcommand("cycle")]
-        | Annotated[options.Calibration, tyro.conf.subcommand("calibration")]
-        | Annotated[options.Real, tyro.conf.subcommand("real")]
+        Annotated[options.DetectionOptions, tyro.conf.subcommand("detection")]
+        | Annotated[options.AvoidanceOptions, tyro.conf.subcommand("avoidance")]
+        | Annotated[options.LocalizationOptions, tyro.conf.subcommand("localization")]
+        | Annotated[options.ShieldOptions, tyro.conf.subcommand("shield")]
+        | Annotated[options.BothOptions, tyro.conf.subcommand("both")]
+        | Annotated[options.CycleOptions, tyro.conf.subcommand("cycle")]
+        | Annotated[options.CalibrationOptions, tyro.conf.subcommand("calibration")]
+        | Annotated[options.RealOptions, tyro.conf.subcommand("real")]
     )
 
     def run(self) -> None:
@@ -29,4 +29,4 @@ class Bench:
         from pretouch_lab.cli import benchmarks  # heavy packages, which the help does without
 
         with numbers_to(self.what.json) as write:
-            write(getattr(benchmarks, type(self.what).__name__.lower())(self.what))
+            write(getattr(benchmarks, type(self.what).__name__.removesuffix("Options").lower())(self.what))

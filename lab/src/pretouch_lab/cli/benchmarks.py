@@ -63,7 +63,7 @@ def _finished(
     return {"about": about | ({"world": world} if world else {}), **numbers, "tables": tables}
 
 
-def detection(options: lab_options.Detection) -> dict[str, Any]:
+def detection(options: lab_options.DetectionOptions) -> dict[str, Any]:
     """See its options."""
     out = _folder(options, "detection", quick=options.quick)
     arms = detecting.plays(options.seeds, options.quick, options.input(options.world))
@@ -71,7 +71,7 @@ def detection(options: lab_options.Detection) -> dict[str, Any]:
     return _finished(options, "detection", out, tables(numbers), numbers["resolution"], **numbers)
 
 
-def avoidance(options: lab_options.Avoidance) -> dict[str, Any]:
+def avoidance(options: lab_options.AvoidanceOptions) -> dict[str, Any]:
     """See its options."""
     trials = avoiding.plays(options.seeds, options.quick, options.baselines, options.scenarios)
     other: Row = {}
@@ -88,7 +88,7 @@ def avoidance(options: lab_options.Avoidance) -> dict[str, Any]:
     return _finished(options, "avoidance", out, shown, text, rows=cells, **summary)
 
 
-def localization(options: lab_options.Localization) -> dict[str, Any]:
+def localization(options: lab_options.LocalizationOptions) -> dict[str, Any]:
     """See its options."""
     out = _folder(options, "localization")
     arms = played("localization", locating.trial, locating.plays(options.seeds, options.quick), out, options)
@@ -96,25 +96,25 @@ def localization(options: lab_options.Localization) -> dict[str, Any]:
     return _finished(options, "localization", out, locating.tables(rows), rows=rows)
 
 
-def shield(options: lab_options.Shield) -> dict[str, Any]:
+def shield(options: lab_options.ShieldOptions) -> dict[str, Any]:
     """See its options."""
     out, trials = _folder(options, "shield"), shielding.plays(options.seeds, options.quick)
     rows = shielding.results(played("shield", shielding.trial, trials, out, options))
     return _finished(options, "shield", out, shielding.tables(rows), rows=rows)
 
 
-def both(options: lab_options.Both) -> dict[str, Any]:
+def both(options: lab_options.BothOptions) -> dict[str, Any]:
     """See its options."""
     out = options.folder(f"bench{folder_part(options.world)}{'-quick' if options.quick else ''}")
     check_numbers(options, out)
     shared = {each.name: getattr(options, each.name) for each in fields(lab_options.InWorlds)} | {"json": None}
-    detected = detection(lab_options.Detection(**shared | {"out": str(out / "detection")}))
-    avoided = avoidance(lab_options.Avoidance(**shared | {"out": str(out / "avoidance")}))
+    detected = detection(lab_options.DetectionOptions(**shared | {"out": str(out / "detection")}))
+    avoided = avoidance(lab_options.AvoidanceOptions(**shared | {"out": str(out / "avoidance")}))
     report([goal_table(detected, avoided), front_table(detected, avoided)], [], out)
     return {"detection": detected, "avoidance": avoided}
 
 
-def real(options: lab_options.Real) -> dict[str, Any]:
+def real(options: lab_options.RealOptions) -> dict[str, Any]:
     """See its options."""
     for name in options.detectors:
         profile(name)  # an hour later would be late
@@ -130,7 +130,7 @@ def real(options: lab_options.Real) -> dict[str, Any]:
     return {"sets": {each.name: each.source for each in sets}, "left_out": left_out, "rows": rows, "tables": shown}
 
 
-def calibration(options: lab_options.Calibration) -> dict[str, Any]:
+def calibration(options: lab_options.CalibrationOptions) -> dict[str, Any]:
     """See its options."""
     if options.skins < 1:
         raise CalibrationError(f"The number of skins is {options.skins}: give at least 1.")
@@ -147,7 +147,7 @@ def calibration(options: lab_options.Calibration) -> dict[str, Any]:
     return {"rows": rows, "motion_s": plan.duration, "tables": shown}
 
 
-def cycle(options: lab_options.Cycle) -> dict[str, Any]:
+def cycle(options: lab_options.CycleOptions) -> dict[str, Any]:
     """See its options."""
     how = options.rate, options.cycles, options.profile, options.priority, options.cpu
     request = timing.CycleRequest(*how, arm=options.arm)

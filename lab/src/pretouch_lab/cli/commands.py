@@ -6,7 +6,7 @@ from pathlib import Path
 import tyro
 
 from pretouch.cli.options import JsonFile
-from pretouch_lab.options import Options, Playing
+from pretouch_lab.options import Playing, TrialOptions
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Demo:
 
 
 @dataclass(frozen=True)
-class Reproduce(Playing, Options):
+class Reproduce(Playing, TrialOptions):
     """Run the paper's experiments in full. A run that was stopped goes on where it was, with the same options."""
 
     experiment: tyro.conf.Positional[str] = "all"
@@ -40,7 +40,7 @@ class Reproduce(Playing, Options):
         from pretouch_lab.domain_randomisation import folder_part
         from pretouch_lab.experiment import NAMES, check
 
-        options = Options(**{each.name: getattr(self, each.name) for each in fields(Options)})
+        options = TrialOptions(**{each.name: getattr(self, each.name) for each in fields(TrialOptions)})
         parts = whole_paper(options) if self.experiment == "all" else [("", self.experiment, options)]
         check(options, NAMES if self.experiment == "all" else (self.experiment,))
         for sentence in sentences(options):

@@ -11,7 +11,7 @@ from pretouch.cli.options import JsonFile
 
 if TYPE_CHECKING:  # the help is to need none of the heavy packages
     from pretouch.robot.model import RobotModel
-    from pretouch_lab.identification.identify import Identified
+    from pretouch_lab.identification.identify import IdentifiedArm
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Identify:
             write(_numbers(result, model, self.file))
 
 
-def _show(result: "Identified", model: "RobotModel", source: str) -> None:
+def _show(result: "IdentifiedArm", model: "RobotModel", source: str) -> None:
     from rich.console import Console
 
     from pretouch.cli.tables import PlainTable
@@ -111,7 +111,7 @@ def _shown(number: float, error: float, identified: bool) -> str:
     return text if identified else f"({text})"
 
 
-def _numbers(result: "Identified", model: "RobotModel", source: str) -> dict[str, Any]:
+def _numbers(result: "IdentifiedArm", model: "RobotModel", source: str) -> dict[str, Any]:
     fitted, noise = result.fit, result.noise
     return {
         "recording": source,

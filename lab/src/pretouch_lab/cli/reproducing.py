@@ -19,24 +19,24 @@ from pretouch.reporting.record import gather
 from pretouch.sim.plant_params import assumed_plant
 from pretouch_lab.cli.playing import DrawnFigure, begin, check_numbers, played, report
 from pretouch_lab.experiment import NAMES, arguments, check, context_of, experiment, play, recording_file
-from pretouch_lab.options import Options, Playing
+from pretouch_lab.options import Playing, TrialOptions
 from pretouch_lab.run import Row
 from pretouch_lab.trial import trace_of
 
 _DEMONSTRATED = ("blind", "paper", "pretouch")
-_PROFILES = (*Options.profiles, "slowing-only", "thresholds-only", "paper-0.5m")
+_PROFILES = (*TrialOptions.profiles, "slowing-only", "thresholds-only", "paper-0.5m")
 _STIFFNESS = (2_000.0, 25_000.0, 75_000.0, 300_000.0)
 _MODES = ("hard", "slack", "floor")
 _STUDIES = {"between": 12, "mounting": 6, "coverage": 4, "two-arms": 3}
 """Studies beside the paper's experiments, each with its number of seeds."""
 _ENDINGS = (".png", ".pdf", ".svg")
-Part = tuple[str, str, Options]
+Part = tuple[str, str, TrialOptions]
 """A folder's name, an experiment, and which of its trials are kept there."""
 
 
 def demonstrate(seeds: int, out: str, json: Path | None) -> None:
     """Play a small part of the paper's three experiments."""
-    one, many = (Options(number, profiles=_DEMONSTRATED) for number in (1, seeds))
+    one, many = (TrialOptions(number, profiles=_DEMONSTRATED) for number in (1, seeds))
     check(many, ("static",))
     # the long trials first, so that the bar moves on in small steps towards the end
     parts = [("avoidance", "avoidance", one), ("dynamic", "dynamic", one), ("static", "static", many)]
@@ -50,24 +50,24 @@ def new_folder(name: str) -> Path:
     return next(path for n in count(1) if not (path := Path("runs") / f"{name}-{n}").exists())
 
 
-def whole_paper(options: Options) -> list[Part]:
+def whole_paper(options: TrialOptions) -> list[Part]:
     """Return all parts of `pretouch reproduce all`.
 
     A study has no more seeds than `options`, nor than its own number. Profiles, restrictions and stiffnesses that are
     given replace those of the paper's three experiments; where they are the defaults, these are varied as well.
     """
-    profiles = _PROFILES if options.profiles == Options.profiles else options.profiles
-    stiffness = _STIFFNESS if options.stiffness == Options.stiffness else options.stiffness
+    profiles = _PROFILES if options.profiles == TrialOptions.profiles else options.profiles
+    stiffness = _STIFFNESS if options.stiffness == TrialOptions.stiffness else options.stiffness
     whole = replace(options, profiles=profiles)
     parts = [("static", "static", replace(whole, stiffness=stiffness))]
     parts += [(name, name, whole) for name in ("avoidance", "dynamic")]
     if not options.restrictions and "paper" in profiles:
         parts.append(("restrictions", "static", replace(options, profiles=("paper",), restrictions=_MODES)))
-    study = Options(skin=options.skin, world=options.world, first_seed=options.first_seed)
+    study = TrialOptions(skin=options.skin, world=options.world, first_seed=options.first_seed)
     return parts + [(name, name, replace(study, seeds=min(options.seeds, n))) for name, n in _STUDIES.items()]
 
 
-def sentences(options: Options) -> list[str]:
+def sentences(options: TrialOptions) -> list[str]:
     """Say what is assumed of another arm."""
     if not options.arm:
         return []
@@ -96,7 +96,7 @@ def reproduce(parts: list[Part], folder: Path, how: Playing) -> None:
         write({"rows": [{"experiment": name, **row} for name, own in rows.items() for row in own], "tables": tables})
 
 
-def _figure_of(where: str, name: str, options: Options, folder: Path, rows: list[Row]) -> list[DrawnFigure]:
+def _figure_of(where: str, name: str, options: TrialOptions, folder: Path, rows: list[Row]) -> list[DrawnFigure]:
     """Draw a part's figure of the recordings of its first seed, if it has one and they can be read."""
     what = experiment(name)
     names = list(what.cells(options)[0])
@@ -130,7 +130,7 @@ def draw_figure(name: str, out: Path, profile_name: str = "paper", seed: int = 0
         raise ExperimentError(f"The figure {out} has no ending that says its format: use {', '.join(_ENDINGS)}.")
     check_writable("figure", out)
     console, context, traces = Console(stderr=True, highlight=False, soft_wrap=True), context_of("", "", ""), []
-    for cell in drawing.cells(what.cells(Options(profiles=(*drawing.beside, profile_name)))):
+    for cell in drawing.cells(what.cells(TrialOptions(profiles=(*drawing.beside, profile_name)))):
         console.print(f"Playing {', '.join(map(str, cell.values()))} with seed {seed}.", markup=False)
         record = what.trial(cell, seed, context)[1]
         if record is not None:

@@ -14,7 +14,7 @@ from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import TextTable
 from pretouch.types import FloatArray
 from pretouch_lab.experiment import Context, Drawing, Experiment, controllers, first_sensing, main
-from pretouch_lab.options import Options
+from pretouch_lab.options import TrialOptions
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, medians, rounded
 from pretouch_lab.trial import Record, play
@@ -65,7 +65,7 @@ class Visitor:
         return HandGoal(HOME, FREE_N, way_round=True)
 
 
-def cells(options: Options) -> list[Row]:
+def cells(options: TrialOptions) -> list[Row]:
     """A cell for each place of the hand and each controller."""
     return [{"place": place, **controller} for place, controller in product(PLACES, controllers(options, "slack"))]
 

@@ -8,7 +8,7 @@ from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.text_table import TextTable
 from pretouch.types import ControlStep
 from pretouch_lab.experiment import Context, Drawing, Experiment, controllers, first_sensing, main
-from pretouch_lab.options import Options
+from pretouch_lab.options import TrialOptions
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, medians, rounded
 from pretouch_lab.trial import Record, play
@@ -37,7 +37,7 @@ _REBOUND_S = 3.0
 _Y = 1
 
 
-def cells(options: Options) -> list[Row]:
+def cells(options: TrialOptions) -> list[Row]:
     """A cell for each controller."""
     return controllers(options, "slack")
 

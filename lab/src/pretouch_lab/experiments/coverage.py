@@ -24,7 +24,7 @@ from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
 from pretouch.text_table import TextTable
 from pretouch.types import FloatArray
 from pretouch_lab.experiment import Context, Experiment, main
-from pretouch_lab.options import Options
+from pretouch_lab.options import TrialOptions
 from pretouch_lab.replay import Ghost
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, share_below, summary, table
@@ -110,7 +110,7 @@ class ApproachingObstacles:
         raise ExperimentError("Nothing can come at the arm where it stands: make the ways shorter.")
 
 
-def cells(options: Options) -> list[Row]:
+def cells(options: TrialOptions) -> list[Row]:
     """A cell for each skin, with the arm on the circle and almost standing, for each profile that senses."""
     sensing = [name for name in options.profiles if profile(name).perception is not None]
     return [{"arm": arm, "skin": skin, "profile": name} for name, arm, skin in product(sensing, ARMS, SKINS)]

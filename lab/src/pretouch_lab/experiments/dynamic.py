@@ -9,7 +9,7 @@ from pretouch.text_table import TextTable
 from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray
 from pretouch_lab.experiment import Context, Drawing, Experiment, controllers, first_sensing, main
-from pretouch_lab.options import Options
+from pretouch_lab.options import TrialOptions
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, peak, rounded, summary, table
 from pretouch_lab.trial import Record, play
@@ -21,7 +21,7 @@ _REBOUND_S = 3.0
 """A later reaction up to this long after the release is the push's echo [s]."""
 
 
-def cells(options: Options) -> list[Row]:
+def cells(options: TrialOptions) -> list[Row]:
     """A cell for each controller."""
     return controllers(options, "slack")
 

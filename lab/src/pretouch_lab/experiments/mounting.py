@@ -12,7 +12,7 @@ from pretouch.sim.scene import SceneSpec
 from pretouch.text_table import TextTable
 from pretouch_lab.experiment import Context, Experiment, controllers, main
 from pretouch_lab.experiments import static
-from pretouch_lab.options import Options
+from pretouch_lab.options import TrialOptions
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, medians, ratios, rounded
 from pretouch_lab.trial import Record, play
@@ -35,7 +35,7 @@ _STIFFNESS_N_PER_M = 25_000.0
 _ROOM_S = 20.0
 
 
-def cells(options: Options) -> list[Row]:
+def cells(options: TrialOptions) -> list[Row]:
     """All places of the board and both paths in an empty room with each misplacement, for each profile that senses."""
     every = [
         {

@@ -11,7 +11,7 @@ from pretouch.text_table import TextTable
 from pretouch.traces import mean_over
 from pretouch.types import ControlStep
 from pretouch_lab.experiment import Context, Drawing, Experiment, controllers, main
-from pretouch_lab.options import Options
+from pretouch_lab.options import TrialOptions
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, medians, peak, ratios, rounded
 from pretouch_lab.trial import Record, play
@@ -25,7 +25,7 @@ _TIME_LIMIT_S = 40.0
 _AFTER_DETECTION_S = 1.0
 
 
-def cells(options: Options) -> list[Row]:
+def cells(options: TrialOptions) -> list[Row]:
     """All combinations of stiffness, trajectory, side and controller."""
     return [
         {"trajectory": trajectory, "side": side, "stiffness_n_per_m": stiffness, **controller}

@@ -10,8 +10,7 @@ import numpy as np
 from pretouch.arms.other_arm import OtherArm
 from pretouch.control.path import WayPoints
 from pretouch.controller import Controller
-from pretouch.loop import Options as LoopOptions
-from pretouch.loop import turn
+from pretouch.loop import Options, turn
 from pretouch.profiles import Profile, profile
 from pretouch.robot.postures import brought_to
 from pretouch.sim.hand import Hand, HandGoal, PersonArm
@@ -21,7 +20,7 @@ from pretouch.sim.scene import BasePose, HandSpec, SceneSpec, fixtures
 from pretouch.text_table import TextTable
 from pretouch.types import ControlStep, FloatArray, RobotState
 from pretouch_lab.experiment import Context, Experiment, controllers, main
-from pretouch_lab.options import Options
+from pretouch_lab.options import TrialOptions
 from pretouch_lab.run import Row
 from pretouch_lab.second_arm import SecondArm
 from pretouch_lab.table import Column, medians, rounded
@@ -118,7 +117,7 @@ class Side:
     arm: ArmInWorld
     units: RangeFinders
     controller: Controller
-    options: LoopOptions
+    options: Options
     """What the controller is told of the other arm."""
     steps: list[ControlStep] = field(default_factory=list)
 
@@ -153,7 +152,7 @@ def play(context: Context, profile: Profile, knows: str, seed: int, duration: fl
     for i, T in enumerate((APART.T, BACK)):
         across = OtherArm(model, T, partial(_reported, sides, 1 - i), fixtures(scene).capsules)
         controller = Controller(model, context.skin, fixtures(scene), ways[i], profile)
-        options = LoopOptions(moving=across) if knows == "told" else LoopOptions()
+        options = Options(moving=across) if knows == "told" else Options()
         sides.append(Side(arms[i], units[i], controller, options))
     clock = PlantClock(first, profile.task.control_period_s)
     while first.time < duration:
@@ -180,7 +179,7 @@ def _mounted(arm: ArmInWorld, across: ArmInWorld, context: Context, seed: int, b
     return units
 
 
-def cells(options: Options) -> list[Row]:
+def cells(options: TrialOptions) -> list[Row]:
     """Each profile that senses, blind to the other arm, with its skin alone, and told of it."""
     return [
         {"knows": knows, **controller}

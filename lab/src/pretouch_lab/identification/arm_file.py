@@ -7,12 +7,12 @@ from matplotlib.figure import Figure
 
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
-from pretouch_lab.identification.identify import Identified
+from pretouch_lab.identification.identify import IdentifiedArm
 
 _MOST_POINTS = 4000
 
 
-def arm_toml(result: Identified, model: RobotModel, source: str) -> str:
+def arm_toml(result: IdentifiedArm, model: RobotModel, source: str) -> str:
     """Return the file's text; what could not be identified keeps its usual value, and a comment says so."""
     fitted, noise, usual = result.fit, result.noise, result.usual
     share = 1.0 - usual.friction_compensated
@@ -63,7 +63,7 @@ def _list(values: Iterable[float] | FloatArray) -> str:
     return f"[{', '.join(f'{float(v):.6g}' if abs(v) >= 1e-6 else '0.0' for v in values)}]"
 
 
-def residual_figure(result: Identified, model: RobotModel, title: str) -> Figure:
+def residual_figure(result: IdentifiedArm, model: RobotModel, title: str) -> Figure:
     """Draw what was to be explained and what is, one row a joint."""
     figure = Figure(figsize=(9, 1.6 * model.n + 1), layout="constrained")
     panels = figure.subplots(model.n, 1, sharex=True, squeeze=False)[:, 0]

@@ -24,7 +24,7 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.traces import on_grid
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
-from pretouch_lab.identification.motion import GRID_S, Motion
+from pretouch_lab.identification.motion import GRID_S, ArmMotion
 from pretouch_lab.identification.recording import Usable, joint_scale
 
 _FINE_S = 0.001
@@ -54,7 +54,7 @@ _REACH = 1.0
 class Columns:
     """What does not depend on the numbers: N samples of n joints; F instants lie 1 ms apart, G as those of a motion."""
 
-    motion: list[Motion]
+    motion: list[ArmMotion]
     """Of each stretch."""
     q: list[FloatArray]
     """(F, n) joint positions in each stretch [rad]."""
@@ -74,7 +74,7 @@ class Columns:
     """(N,) samples in and shortly before which no joint's speed changes quickly: there its derivative is known."""
 
 
-def columns_of(data: Usable, motions: list[Motion], model: RobotModel) -> Columns:
+def columns_of(data: Usable, motions: list[ArmMotion], model: RobotModel) -> Columns:
     """Work out all that does not depend on what is to be found."""
     s, n = data.samples, model.n
     kick, noise, calm = np.zeros(s.q.shape), np.zeros(s.q.shape), np.zeros(len(s.stamp), np.bool_)
@@ -102,7 +102,7 @@ def columns_of(data: Usable, motions: list[Motion], model: RobotModel) -> Column
     return Columns(motions, positions, speeds, carried, kick, noise, square, calm)
 
 
-def _calm(motion: Motion, time: FloatArray) -> BoolArray:
+def _calm(motion: ArmMotion, time: FloatArray) -> BoolArray:
     """Say which samples (N,) of a stretch are calm, and not among its first: there the low-pass still begins."""
     quick = motion.quick.copy()
     quick[: round(_REMEMBERED_S / GRID_S)] = True
@@ -153,7 +153,7 @@ def friction_parts(speed: FloatArray, steepness: FloatArray, asymmetry: FloatArr
 
 
 @value
-class Fit:
+class ResidualFit:
     """What was found; n joints, p = 6 n + n + 2 numbers."""
 
     numbers: FloatArray
@@ -180,7 +180,7 @@ class Fit:
         return which[: OWN * n].reshape(n, OWN)
 
 
-def fit(data: Usable, columns: Columns, used: BoolArray, usual: PlantParams, payload: bool = True) -> Fit:
+def fit(data: Usable, columns: Columns, used: BoolArray, usual: PlantParams, payload: bool = True) -> ResidualFit:
     """Find all parts from the samples that are used (N,); without `payload` that stays 0."""
     n, cycles = data.samples.q.shape[1], np.array(usual.ripple_cycles)
     start, priors = _begin(n, usual, payload)
@@ -213,7 +213,7 @@ def fit(data: Usable, columns: Columns, used: BoolArray, usual: PlantParams, pay
     X, expected = design(data, columns, carried, theta, gain, cycles)
     kicked = theta[-1] * columns.kick
     score = np.einsum("ijp,ij->ip", X, (data.samples.tau - expected - kicked) * weight)
-    return Fit(theta, _standard_errors(data, H, precision, score), priors, gain, expected, kicked)
+    return ResidualFit(theta, _standard_errors(data, H, precision, score), priors, gain, expected, kicked)
 
 
 def _begin(n: int, usual: PlantParams, payload: bool) -> tuple[FloatArray, FloatArray]:

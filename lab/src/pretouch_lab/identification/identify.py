@@ -10,7 +10,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sim.plant_params import PlantParams
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
-from pretouch_lab.identification.fit import BLOCK_S, OWN, Columns, Fit, columns_of, fit
+from pretouch_lab.identification.fit import BLOCK_S, OWN, Columns, ResidualFit, columns_of, fit
 from pretouch_lab.identification.motion import moved
 from pretouch_lab.identification.recording import LEAST_S, ArmSamples, Usable, joint_scale, usable
 
@@ -57,10 +57,10 @@ class Quantity:
 
 
 @value
-class Identified:
+class IdentifiedArm:
     """What a recording of free motion tells of an arm with n joints."""
 
-    fit: Fit
+    fit: ResidualFit
     noise: Noise | None
     """None without velocities: theirs is then in what is left of the torques, and the observer's gain stays."""
     samples: ArmSamples
@@ -96,7 +96,7 @@ class Identified:
         return [Quantity(*row) for row in rows]
 
 
-def identify(samples: ArmSamples, model: RobotModel, usual: PlantParams) -> Identified:
+def identify(samples: ArmSamples, model: RobotModel, usual: PlantParams) -> IdentifiedArm:
     """Identify an arm. CalibrationError for a recording that cannot tell, with what is missing."""
     if samples.q.shape[1] != model.n or samples.tau.shape[1] != model.n:
         raise CalibrationError(
@@ -144,10 +144,10 @@ def identify(samples: ArmSamples, model: RobotModel, usual: PlantParams) -> Iden
             f"{' and more' if len(spans) > 8 else ''}."
         )
     noise = None if samples.qd is None else noise_of(data, columns, fitted, used, usual)
-    return Identified(fitted, noise, data.samples, spans, tuple(notes), seconds, usual)
+    return IdentifiedArm(fitted, noise, data.samples, spans, tuple(notes), seconds, usual)
 
 
-def free_samples(data: Usable, fitted: Fit) -> tuple[BoolArray, tuple[tuple[float, float], ...]]:
+def free_samples(data: Usable, fitted: ResidualFit) -> tuple[BoolArray, tuple[tuple[float, float], ...]]:
     """Say which samples (N,) are of free motion, and from when to when [s] something else is.
 
     What a contact does lasts longer than noise: means over `_CONTACT_S` are compared with how far such means usually
@@ -180,7 +180,7 @@ def free_samples(data: Usable, fitted: Fit) -> tuple[BoolArray, tuple[tuple[floa
     return used, tuple(spans)
 
 
-def noise_of(data: Usable, columns: Columns, fitted: Fit, used: BoolArray, usual: PlantParams) -> Noise:
+def noise_of(data: Usable, columns: Columns, fitted: ResidualFit, used: BoolArray, usual: PlantParams) -> Noise:
     """Take the noise of the samples that are used (N,) apart, where velocities are measured.
 
     A first-order noise of corner a through the discrete low-pass of the observer, alpha = K dt / (1 + K dt), keeps the

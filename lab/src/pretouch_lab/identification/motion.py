@@ -49,7 +49,7 @@ _MOST_PACE = 0.1
 
 
 @value
-class Motion:
+class ArmMotion:
     """How an arm with n joints moved in one stretch without a gap, at G instants, `GRID_S` apart."""
 
     at: FloatArray
@@ -74,7 +74,7 @@ class Motion:
         return CubicHermiteSpline(self.at, self.q, self.qd)
 
 
-def motions_of(times: list[FloatArray], positions: list[FloatArray]) -> list[Motion]:
+def motions_of(times: list[FloatArray], positions: list[FloatArray]) -> list[ArmMotion]:
     """Estimate the motion in stretches with stamps (N,) [s] and positions (N, n) [rad], all by a fit of one width."""
     grids = [time[0] + GRID_S * np.arange(int((time[-1] - time[0]) / GRID_S) + 2) for time in times]
     samples = list(zip(times, positions, grids, strict=True))
@@ -92,7 +92,7 @@ def motions_of(times: list[FloatArray], positions: list[FloatArray]) -> list[Mot
         unsure = gains[:, 2, None] * noise  # of the accelerations
         quick = (np.abs(fitted[2]) - 0.5 * _SIGMAS * unsure > _QUICK_RAD_S2) | (unsure > _QUICK_RAD_S2)
         quick = np.any(quick | (np.abs(off) > allowed), axis=1)
-        motions.append(Motion(at, fitted[0], fitted[1], fitted[2], quick, half, noise, gain[1] * noise))
+        motions.append(ArmMotion(at, fitted[0], fitted[1], fitted[2], quick, half, noise, gain[1] * noise))
     return motions
 
 
@@ -158,7 +158,7 @@ def _nearest(time: FloatArray, at: FloatArray) -> FloatArray:
     return np.asarray(np.min(ways, axis=0))
 
 
-def moved(data: Usable) -> tuple[Usable, list[Motion]]:
+def moved(data: Usable) -> tuple[Usable, list[ArmMotion]]:
     """Estimate the motion of each stretch; returns the samples as well, with better stamps if theirs are uneven."""
     s, spans, notes, off_s = data.samples, data.stretches, list(data.notes), 0.0
     positions, stamps = [s.q[span] for span in spans], [s.stamp[span] for span in spans]
@@ -186,7 +186,7 @@ def moved(data: Usable) -> tuple[Usable, list[Motion]]:
 
 
 def _stamp_errors(
-    stamps: list[FloatArray], positions: list[FloatArray], motions: list[Motion]
+    stamps: list[FloatArray], positions: list[FloatArray], motions: list[ArmMotion]
 ) -> tuple[list[FloatArray], float]:
     """Errors (N,) [s] that explain what positions are off along the speed, and their size; 0 where there are none.
 
@@ -211,7 +211,7 @@ def _stamp_errors(
     return np.split(believed, np.cumsum([len(time) for time in stamps])[:-1]), float(np.sqrt(variance))
 
 
-def _paced(stamps: list[FloatArray], velocities: list[FloatArray], motions: list[Motion]) -> list[FloatArray]:
+def _paced(stamps: list[FloatArray], velocities: list[FloatArray], motions: list[ArmMotion]) -> list[FloatArray]:
     """Stretch time where all joints are measured slower than their positions change, and the other way round.
 
     That is believed as far as it exceeds what the velocities' noise does.

@@ -16,7 +16,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray, RangeReadings, RangeStatus, RobotState
 from pretouch_lab.bench.avoidance_scenes import Scenario, arm, scenarios, setting, skin
-from pretouch_lab.trial import Simulation
+from pretouch_lab.trial import SimulatedTrial
 
 PEOPLE = ("person -y", "person +y", "beside", "inside", "walking")
 """Scenes of the avoidance benchmark with people."""
@@ -109,7 +109,7 @@ class Interface:
         return desired.joint_velocities(stamp, number)
 
 
-class Scene:
+class ReachScene:
     """The arm of a scenario and a seed: the same errors, person and noise as the benchmark's trial of that seed."""
 
     def __init__(self, scenario: Scenario, profile: Profile, skin: str, seed: int) -> None:
@@ -117,7 +117,7 @@ class Scene:
         scene = setting(replace(scenario, params={**scenario.params, "skin": skin}), profile, seed)
         setup = scene.setup
         self._path, self._shape, self.model = setup.path, scene.shape, setup.model
-        self._arm = Simulation(setup)
+        self._arm = SimulatedTrial(setup)
         self._state = self._arm.controller.init(self._arm.plant.read())
         self._forces = np.zeros(_MEAN_STEPS - 1)
         self.contacts = 0
@@ -220,7 +220,7 @@ class ReachEnv(gymnasium.Env):  # type: ignore[misc]  # not followed, see pyproj
         bounds = self.interface.bounds()
         self.observation_space = Dict({name: Box(*map(np.float32, pair)) for name, pair in bounds.items()})
         self.action_space = Box(-1.0, 1.0, self.interface.scale.shape, np.float32)
-        self._scene: Scene | None = None
+        self._scene: ReachScene | None = None
         self._goal, self._distance, self._begun = np.zeros(3), 0.0, 0.0
         self._goals = self._at_goal = 0
 
@@ -231,7 +231,7 @@ class ReachEnv(gymnasium.Env):  # type: ignore[misc]  # not followed, see pyproj
         super().reset(seed=seed)
         scenario = self._scenes[int(self.np_random.integers(len(self._scenes)))]
         number = int(self.np_random.integers(2**31)) if seed is None else seed
-        self._scene = Scene(scenario, self._profile, self._skin, number)
+        self._scene = ReachScene(scenario, self._profile, self._skin, number)
         self._begun, self._goals = self._scene.step.stamp, 0
         self._next_goal(self._scene)
         return self._seen(self._scene)
@@ -257,11 +257,11 @@ class ReachEnv(gymnasium.Env):  # type: ignore[misc]  # not followed, see pyproj
         observation, info = self._seen(scene)
         return observation, float(earned), over, late and not over, info
 
-    def _next_goal(self, scene: Scene) -> None:
+    def _next_goal(self, scene: ReachScene) -> None:
         self._goal, self._at_goal = scene.goal(self.np_random), 0
         self._distance = float(np.linalg.norm(self._goal - scene.ee_position))
 
-    def _seen(self, scene: Scene) -> tuple[Observation, dict[str, Any]]:
+    def _seen(self, scene: ReachScene) -> tuple[Observation, dict[str, Any]]:
         limited = scene.step.limited
         return self.interface.observe(scene.robot, scene.readings, self._goal), {
             "contacts": scene.contacts,
