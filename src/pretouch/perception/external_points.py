@@ -87,7 +87,7 @@ def _is_point(stamp: float, point: FloatArray, m: int, sigma: float) -> bool:
     return bool(0.0 <= sigma <= LARGEST_SIGMA and np.isfinite(stamp))
 
 
-class _Candidates(NamedTuple):
+class _PointCandidates(NamedTuple):
     """M points among which those of the slots are chosen."""
 
     near: Obstacles
@@ -157,7 +157,7 @@ def take_points(
 @inlined
 def _candidates(
     sight: Sight, state: OutsideState, new: SeenPoints, now: float, body: Capsules, arm: Capsules
-) -> _Candidates:
+) -> _PointCandidates:
     """Return the points that the arm hides and the new ones that are young enough, each with its nearest link."""
     p, sigmas, tracks = sight.outside, sight.perception.spread_sigmas, state.tracks
     room, count = len(new.stamp) + len(state.sigma), 0
@@ -182,12 +182,12 @@ def _candidates(
     for m in range(count):
         near.body_distance[m] -= sigmas * sigma[m]
         first[m] = p.per_link * np.searchsorted(links, near.link[m])
-    return _Candidates(near, sigma, stamp, status, first)
+    return _PointCandidates(near, sigma, stamp, status, first)
 
 
 @inlined
 def _choose(
-    candidates: _Candidates, chosen: IntArray, sight: Sight, capsules: tuple[Capsules, Capsules, Capsules],
+    candidates: _PointCandidates, chosen: IntArray, sight: Sight, capsules: tuple[Capsules, Capsules, Capsules],
     placed_for: float, chain: Chain, posed: float,
 ) -> None:  # fmt: skip
     """Write the candidate of each slot to `chosen`: for each link the nearest, then the nearest apart from it.
