@@ -68,7 +68,7 @@ def test_a_damaged_line_is_named_and_left_as_it_is(tmp_path, line):
 
 
 @pytest.mark.parametrize(
-    ("measured", "match"), [({"value": {1}}, "'b'.*seed 3 is not of plain values"), ({"name": 1}, "measures 'name'")]
+    ("measured", "match"), [({"value": {1}}, "'b'.*seed 3 cannot be JSON"), ({"name": 1}, "returns 'name'")]
 )
 def test_what_cannot_be_a_row_is_not_kept_and_those_before_are(tmp_path, measured, match):
     def fails(cell, seed):

@@ -1,1 +1,1 @@
-"""What proves Pretouch: the paper's experiments, benchmarks, sweeps and studies."""
+"""Evidence for Pretouch: the paper's experiments, benchmarks, sweeps and studies."""

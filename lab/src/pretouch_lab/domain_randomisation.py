@@ -1,4 +1,4 @@
-"""Domain randomisation of a trial: what its seed draws of a named set, under what the experiment itself varies."""
+"""Domain randomisation of a trial: the seed draws an arm and sensors from a set; the experiment's own values stay."""
 
 import re
 from dataclasses import dataclass
@@ -17,20 +17,20 @@ named_set = cache(world_set)
 
 @dataclass(frozen=True)
 class Parts:
-    """What of a trial the domain randomisation decides."""
+    """Parts of a trial that the domain randomisation draws."""
 
     plant: PlantParams
     ranging: RangeFinderParams
     skin: Skin
-    """Where the units truly sit."""
+    """Units at their true places."""
     believed: Skin | None
-    """Where the controller believes them to be; None: it knows the truth."""
+    """Units at the places that the controller assumes; None: the true ones."""
 
 
 def randomised(name: str, seed: int, model: RobotModel, parts: Parts) -> Parts:
-    """Return the parts of a trial as its seed draws them of a set; as they are with no name.
+    """Draw the parts of a trial from a set by its seed; without a name, return the parts unchanged.
 
-    What the parts have otherwise than the usual arm, sensors and skin is what the experiment varies, and stays.
+    A value that differs from the default arm, sensors or skin was set by the experiment, and stays.
     """
     if not name:
         return parts
@@ -44,7 +44,7 @@ def randomised(name: str, seed: int, model: RobotModel, parts: Parts) -> Parts:
 
 
 def folder_part(name: str) -> str:
-    """Return what a folder's name has of a set: nothing of none, so that runs with different sets are kept apart."""
+    """Return the suffix of a folder's name that separates runs with different sets; empty without a set."""
     if not name:
         return ""
     if name in SETS:
@@ -54,7 +54,7 @@ def folder_part(name: str) -> str:
 
 
 def sentence(name: str) -> str:
-    """Say with which set something was played, or nothing of the usual arm."""
+    """Return a sentence that names the set of a run; empty without a set."""
     if not name:
         return ""
     about = named_set(name).about

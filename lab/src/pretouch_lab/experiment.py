@@ -1,4 +1,4 @@
-"""What every experiment is made of: options as cells, trials on an arm that all of them share, tables and a figure."""
+"""Parts of an experiment: cells from options, trials on a shared arm, tables and a figure."""
 
 import os
 import re
@@ -36,9 +36,9 @@ if TYPE_CHECKING:
 NAMES = ("static", "avoidance", "dynamic", "between", "mounting", "coverage", "two-arms")
 """All experiments, each in a file of `experiments`, in the order of their tables."""
 _OF_THE_PAPER = ("off", "hard", "slack", "floor")
-"""Restriction modes of the paper's equations; any other makes a profile what it is."""
+"""Restriction modes of the paper's equations. A profile with another mode keeps it."""
 _NAMES_MODE = re.compile(r":approach(\.rows)?=")
-"""How the name of a profile names a mode."""
+"""Pattern of a profile's name that states a mode."""
 
 
 @dataclass(frozen=True)
@@ -46,13 +46,13 @@ class Drawing:
     """An experiment's figure."""
 
     name: str
-    """As `pretouch figure` takes it; a function of `experiments.figures` has the same."""
+    """Argument of `pretouch figure`, and name of a function of `experiments.figures`."""
     text: str
-    """What it shows."""
+    """Caption."""
     cells: Callable[[list[Row]], list[Row]]
-    """Chooses of cells, or of rows of their trials, those that it shows."""
+    """Selects the cells, or the rows of their trials, that the figure shows."""
     beside: tuple[str, ...] = ()
-    """Profiles that it shows beside a profile with proximity."""
+    """Profiles that the figure compares with a profile that senses proximity."""
 
     def draw(self, traces: list[Trace], units: tuple[str, ...]) -> "Figure":
         """Draw traces, given the names of the skin's units."""
@@ -64,33 +64,33 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Context:
-    """What all trials of a run share."""
+    """Arm, skin and simulation parameters that all trials of a run share."""
 
     model: RobotModel
     skin: Skin
     placement: Placement = field(default_factory=Placement)
-    """Where the paper's paths and places are for this arm."""
+    """Places of the paper's paths and objects, scaled to this arm."""
     world: str = ""
-    """Set of the domain randomisation of which each trial's seed draws its own, or none."""
+    """Set of the domain randomisation that each trial's seed draws from; empty: none."""
     recording: Path | None = None
-    """File to record the trial in, if it is to be recorded."""
+    """File for the recording of the trial; None: no recording."""
     plant: PlantParams | None = None
-    """How far the arm is from its model; none, and as far as real arms are (`plant_params_of`)."""
+    """Errors of the simulated arm against its model; None: those of `plant_params_of`."""
     ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
-    """How the skin's units err."""
+    """Errors of the skin's range finders."""
 
     @property
     def arm(self) -> PlantParams:
-        """How far the arm is from its model."""
+        """Errors of the simulated arm against its model."""
         return self.plant or plant_params_of(self.model.description)
 
     def profile(self, cell: Row) -> Profile:
-        """Return a cell's profile, with the restriction mode of the cell if it names one."""
+        """Return a cell's profile; a restriction mode of the cell replaces the profile's."""
         own = profile(cell["profile"])
         return changed(own, modes()[cell["restrictions"]]) if "restrictions" in cell else own
 
     def setup(self, cell: Row, seed: int, scene: SceneSpec, path: TaskPath, **other: Any) -> Setup:
-        """Return what a trial of a cell is made of; `other` are further fields of `Setup`, or other values of them."""
+        """Return the setup of a cell's trial; `other` sets or replaces fields of `Setup`."""
         usual = Setup(self.model, self.skin, self.profile(cell), scene, path, seed)
         shared = {"plant": self.arm, "ranging": self.ranging, "recording": self.recording, "world": self.world}
         return replace(usual, **shared | other)
@@ -98,25 +98,25 @@ class Context:
 
 @dataclass(frozen=True)
 class Experiment:
-    """Cells to run, how to play a trial of one, and what to make of the rows that come out."""
+    """An experiment: its cells, its trial, and the tables and figure of its rows."""
 
     name: str
     cells: Callable[[TrialOptions], list[Row]]
     trial: Callable[[Row, int, Context], tuple[Row, Record | None]]
-    """Plays the trial of a cell with a seed; returns what is measured, and its course if the figure may want it."""
+    """Plays the trial of a cell with a seed; returns the row, and the record that a figure needs."""
     tables: Callable[[list[Row]], list[TextTable]]
-    """Makes tables of the rows that there are."""
+    """Writes tables of the rows of all trials."""
     drawing: Drawing | None = None
     any_arm: bool = False
-    """Whether it can be played with another arm than the Panda."""
+    """True if other arms than the Panda can play it."""
 
     def plays(self, options: TrialOptions) -> list[Play]:
-        """Return all trials, seed by seed; an ExperimentError if there is none."""
+        """Return all trials, seed by seed. Raises ExperimentError without any."""
         cells = self.cells(options)
         if not cells:
             raise ExperimentError(
-                f"There is nothing to run: {self.name} is about proximity, and none of the profiles"
-                f" {', '.join(options.profiles)} has it."
+                f"The experiment {self.name} needs a profile that senses proximity, and none of"
+                f" {', '.join(options.profiles)} does: give paper or pretouch."
             )
         return plays_of(cells, range(options.first_seed, options.first_seed + options.seeds))
 
@@ -130,17 +130,17 @@ def experiment(name: str) -> Experiment:
 
 
 def modes() -> dict[str, dict[str, str]]:
-    """Return what each restriction mode changes of a profile: none, the rows of the paper's, and other parts."""
+    """Return the changes to a profile for each restriction mode: off, the paper's rows, and other restrictions."""
     rows = {kind: {"approach": ApproachRestriction.name, "approach.rows": kind} for kind in get_args(RowKind)}
     parts = {name: {"approach": name} for name in Restriction.choices() if name != ApproachRestriction.name}
     return {"off": {"approach": "none"}} | rows | parts
 
 
 def controllers(options: TrialOptions, restrictions: str) -> list[Row]:
-    """Return profiles with restriction modes; `restrictions` is the experiment's own.
+    """Return pairs of profile and restriction mode; `restrictions` is the experiment's default mode.
 
-    Without proximity the mode is `off`; a profile that is named with a mode keeps it, and so does one whose mode is not
-    of the paper's equations.
+    A profile without proximity has the mode `off`. A profile whose name states a mode keeps it. So does a profile whose
+    mode is not one of the paper's equations.
     """
     pairs = []
     for name in options.profiles:
@@ -153,16 +153,16 @@ def controllers(options: TrialOptions, restrictions: str) -> list[Row]:
 
 
 def first_sensing(rows: list[Row]) -> list[Row]:
-    """Choose one of some cells or trials: the first with proximity, or the first where none has any."""
+    """Return the first cell or trial whose profile senses proximity, else the first one."""
     return ([row for row in rows if profile(row["profile"]).perception is not None] or rows)[:1]
 
 
 def check(options: TrialOptions, names: Sequence[str]) -> None:
-    """Raise an error of this package for options with which experiments cannot be played."""
+    """Raise an error of this package for options that the experiments cannot use."""
     others = [name for name in names if not experiment(name).any_arm]
     if options.arm and others:
-        known = ", ".join(name for name in NAMES if experiment(name).any_arm)
-        raise ExperimentError(f"The experiment {others[0]!r} is laid out for the Panda: with --arm, choose {known}.")
+        choices = ", ".join(name for name in NAMES if experiment(name).any_arm)
+        raise ExperimentError(f"The experiment {others[0]!r} is laid out for the Panda: with --arm, choose {choices}.")
     if options.seeds < 1:
         raise ExperimentError(f"The number of seeds is {options.seeds}: give at least 1.")
     if options.first_seed < 0:
@@ -177,7 +177,7 @@ def check(options: TrialOptions, names: Sequence[str]) -> None:
     for what, values in (("profiles", options.profiles), ("stiffnesses", options.stiffness)):
         if not values or len(set(values)) < len(values):
             listed = ", ".join(map(str, values)) or "none"
-            raise ExperimentError(f"The {what} are {listed}: name each wanted one once.")
+            raise ExperimentError(f"The {what} are {listed}: name at least one, and each once.")
     if options.world:
         world_set(options.world)
     context_of(options.arm, options.skin, options.world)  # a bad skin is refused before any process starts
@@ -185,13 +185,13 @@ def check(options: TrialOptions, names: Sequence[str]) -> None:
 
 @lru_cache
 def context_of(arm: str, skin: str, world: str) -> Context:
-    """Load what all trials share, once in each process."""
+    """Load the context of all trials, once in each process."""
     model = RobotModel(robot_named(arm or "panda"))
     return Context(model, skin_for(model, skin), placement_for(model), world)
 
 
 def arguments(name: str, options: TrialOptions) -> Row:
-    """Return what rows depend on, for `run.open_run`: the options, and digests of the files that they only name."""
+    """Return the options and the digests of their files for `run.open_run`: all that the rows depend on."""
     arm = robot_named(options.arm or "panda")
     file = Path(options.skin or skin_file(arm))
     try:
@@ -202,19 +202,19 @@ def arguments(name: str, options: TrialOptions) -> Row:
         digests["arm_sha256"] = files_digest(arm)
     if options.world:
         digests["world_sha256"] = world_set(options.world).digest
-    # rows say their seeds, so that a folder may be given more of them
+    # each row states its seed, so a folder can take more seeds later
     own = {each.name: getattr(options, each.name) for each in fields(TrialOptions) if "seed" not in each.name}
     return {"experiment": name, **own, **digests}
 
 
 def play(name: str, options: TrialOptions, out: Path, cell: Row, seed: int) -> Row:
-    """Play one trial, and record it in a folder if it is to be recorded; return what is measured."""
+    """Play one trial and return its row; record it in a folder where the options ask for that."""
     what, context = experiment(name), context_of(options.arm, options.skin, options.world)
     place = recording_file(out, cell, seed)
     unfinished = place.with_suffix(".unfinished")
     if options.record == "all" or (seed == 0 and what.drawing):
         place.parent.mkdir(parents=True, exist_ok=True)
-        for file in (place, unfinished):  # of a worker that was killed, or whose row was torn
+        for file in (place, unfinished):  # left by a killed worker, or by a row that was not written whole
             file.unlink(missing_ok=True)
         context = replace(context, recording=unfinished)
     row = what.trial(cell, seed, context)[0] | ({"world": options.world} if options.world else {})
@@ -224,7 +224,7 @@ def play(name: str, options: TrialOptions, out: Path, cell: Row, seed: int) -> R
 
 
 def recording_file(out: Path, cell: Row, seed: int) -> Path:
-    """Return where a trial's recording is kept: where two cells' names could become one, a digest tells them apart."""
+    """Return the file of a trial's recording; a digest separates cells whose file names would be equal."""
     exact = "_".join(f"{value:.12g}" if isinstance(value, float) else str(value) for value in cell.values())
     safe = re.sub(r"[^A-Za-z0-9._+-]", "-", exact)  # + and - tell sides apart
     name = safe if safe == exact else f"{safe}-{sha256(exact.encode()).hexdigest()[:8]}"

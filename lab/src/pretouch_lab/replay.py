@@ -1,4 +1,4 @@
-"""A detector alone on recorded steps, the answers to its alarms, and the ghost that is seen in such steps."""
+"""A detector alone on recorded steps, the reactions to its alarms, and the ghost that moves in such steps."""
 
 from collections.abc import Callable
 
@@ -21,13 +21,13 @@ _TRACK, _REACT = ModeState(Mode.TRACK, Event.CLEAR), ModeState(Mode.REACT, Event
 
 
 class DetectorAlone:
-    """A profile's contact detector on its own, given the steps of a stream one after the other.
+    """A profile's contact detector without a controller; it takes the steps of a stream in order.
 
-    It remembers by itself, and never reacts: what follows an alarm is for the stream to say.
+    It keeps its own state and never reacts: the stream has the steps that follow an alarm.
     """
 
     def __init__(self, profile: Profile, model: RobotModel, skin: Skin | None = None) -> None:
-        """Take the arm, and its units where the detector reads more of them than what is near."""
+        """Take the arm, and its skin if the detector reads touch sensors."""
         self.body = Body(model, skin or Skin((), model), profile.task.control_period_s)
         self._detector, self._params = profile.detect, profile.window
         self.window, self.state = window_init(profile.window.samples), self._detector.init(self.body)
@@ -36,44 +36,44 @@ class DetectorAlone:
         self, kin: Kinematics, robot: RobotState, near: Obstacles, reacting: bool = False, watched: bool = True,
         touches: TouchReadings | None = None,
     ) -> Detection:  # fmt: skip
-        """Take in a step: posture, robot state, obstacles, whether it reacts and is watched, touch readings."""
+        """Detect in one step; `reacting` and `watched` are flags of the arm and its skin in that step."""
         before, force = self.window, None if robot.wrench is None else robot.wrench[:3]
         window = add_force(before, force, self._params)
         sample = Sample(robot.stamp, kin, robot, window, before.full, near, reacting, watched, touches)
-        found, self.state = self._detector.step(self.state, self.body, sample)
+        detection, self.state = self._detector.step(self.state, self.body, sample)
         self.window = before if reacting and self._params.freeze_while_reacting else window
-        return found
+        return detection
 
 
 class FirstMotion:
-    """How an arm would begin to move with what a detector takes for a contact, in a stream that went on without.
+    """First motion with which an arm would react to an alarm, in a stream whose arm did not react.
 
-    That is for reactions in joint space, which learn in free motion and may begin late.
+    It serves reactions in joint space, which learn in free motion and may begin late.
     """
 
     def __init__(self, model: RobotModel, profile: Profile, q: FloatArray, rest: int) -> None:
-        """Take the arm, its profile, first joint positions (n,) [rad], and the steps of an answer."""
+        """Take the arm, its profile, the first joint positions (n,) [rad], and the number of steps of a reaction."""
         self._body = Body(model, Skin((), model), profile.task.control_period_s)
         self._react, self._rest = profile.react, rest
         self._state, self._mass = self._react.init(self._body, q), mass_init(model.n, Admittance.of_kind(self._react))
         self._left, self._moves = 0, False
 
-    def step(self, kin: Kinematics, robot: RobotState, found: Detection, near: Obstacles) -> FloatArray | None:
-        """Take a step in; return the joint velocities (n,) [rad/s] with which an answer begins to move, else None.
+    def step(self, kin: Kinematics, robot: RobotState, detection: Detection, near: Obstacles) -> FloatArray | None:
+        """Take one step; return the joint velocities (n,) [rad/s] with which a reaction begins, else None.
 
-        That may be later than the alarm, for static friction holds an arm until the push is strong enough.
+        The motion may begin after the alarm: static friction holds the arm until the push is strong enough.
         """
         mode = _REACT if self._left else _TRACK
-        given = ReactionInputs(mode, kin, robot, found, near, False, robot.qd_commanded, 0.0, False, self._mass)
+        inputs = ReactionInputs(mode, kin, robot, detection, near, False, robot.qd_commanded, 0.0, False, self._mass)
         self._moves = self._moves and self._left > 0
         if not self._moves:
-            _, self._state = self._react.sense(self._state, self._body, given)
-        if self._left == 0 and found.contact is None:
+            _, self._state = self._react.sense(self._state, self._body, inputs)
+        if self._left == 0 and detection.contact is None:
             return None
         self._left = (self._left or self._rest) - 1
         if self._moves:
             return None
-        answer, self._state = self._react.move(self._state, self._body, given, _REACT)
+        answer, self._state = self._react.move(self._state, self._body, inputs, _REACT)
         if answer is None or answer.qd is None:
             return None
         self._moves = bool(answer.qd.any())
@@ -81,14 +81,14 @@ class FirstMotion:
 
 
 Place = FloatArray | Callable[[float], FloatArray]
-"""Where something is (3,) [m], base frame; as a function of time [s] if it moves."""
+"""Position (3,) [m], base frame; a function of time [s] for a moving object."""
 
 
 class Ghost:
-    """Puts the ghost of a plant's scene into its place, before each physics step where that moves."""
+    """Places the ghost of a plant's scene, before each physics step if it moves."""
 
     def __init__(self, plant: Plant, place: Place) -> None:
-        """Attach to a plant whose scene has a ghost, of which the place is the centre."""
+        """Attach to a plant whose scene has a ghost; `place` is the ghost's centre."""
         body = plant.mj_model.body("ghost")
         # a view into the simulation's memory, taken once
         self._at = plant.mj_data.mocap_pos[int(plant.mj_model.body_mocapid[body.id])]

@@ -1,7 +1,7 @@
-"""Plays in any executor: a function of a cell and a seed gives a row, a line of a file that a later run continues.
+"""Plays trials in any executor: a cell and a seed give a row, and a later run continues the file of rows.
 
-A folder holds `run.json`, which says of what its rows are (version, commit, arguments), and `rows.jsonl`, a row in each
-line. What is there is not played again; what another version or other arguments began is refused.
+A folder holds `run.json` (version, commit, arguments) and `rows.jsonl`, one row a line. A trial whose row is in the
+folder is not played again. A folder of another version or of other arguments is refused.
 """
 
 import fcntl
@@ -30,20 +30,20 @@ from pretouch.signals import kept_from_children, leave_to_parent, noted
 CLUSTER = Extra("cluster", ("distributed",), "cluster", "pretouch-lab")
 ROWS, RUN = "rows.jsonl", "run.json"
 _CONNECT_S = 10.0
-"""How long a scheduler has to answer [s]."""
+"""Time limit for a scheduler's answer [s]."""
 
 Row = dict[str, Any]
-"""What one play or several came to: plain values by their names."""
+"""Result of one play or of several: plain values by name."""
 Cell = Row
-"""What tells plays from others but the seed: all cells of a run have the same names."""
+"""Parameters of a play, without its seed. All cells of a run have the same names."""
 Play = tuple[Cell, int]
 """A cell and a seed."""
 Trial = Callable[[Cell, int], Row]
-"""Gives a row for a cell and a seed. A function of a module, or a `partial` of one, as it goes to workers."""
+"""Returns the row of a cell and a seed. Workers need a function of a module, or a `partial` of one."""
 
 
 def plays_of(cells: Iterable[Cell], seeds: Iterable[int]) -> list[Play]:
-    """Return all cells with each seed, seed by seed, so that a stopped run has some of each cell."""
+    """Return all cells with each seed, seed by seed, so that a stopped run has rows of every cell."""
     every = list(cells)
     return [(cell, seed) for seed in seeds for cell in every]
 
@@ -56,19 +56,19 @@ def run(
     at_once: int = os.cpu_count() or 1,
     done: Callable[[], None] = lambda: None,
 ) -> list[Row]:
-    """Play what is not in a folder yet, and return the rows of all plays, in their order.
+    """Play the trials whose rows the folder lacks, and return the rows of all plays, in their order.
 
     Args:
         trial: plays a cell with a seed.
-        plays: cells with their seeds, in the order in which they are begun; the same one is played once.
-        out: the folder. However the run ends, rows of finished plays are in its `rows.jsonl`.
-        executor: plays them; None: this process, one after the other.
-        at_once: how many plays the executor has at a time.
+        plays: cells with their seeds, in the order of their start. Equal plays are played once.
+        out: the folder. Its `rows.jsonl` has the rows of finished plays, even if the run fails.
+        executor: plays the trials; None: this process, one trial at a time.
+        at_once: number of plays that the executor has at a time.
         done: called after each play.
 
     Raises:
-        ExperimentError: for a worker that was killed, for rows that cannot be read or written, and for what a trial
-            gives that cannot be one.
+        ExperimentError: if a worker was killed, if rows cannot be read or written, or if a trial returns values that
+            JSON cannot hold.
     """
     with _rows_in(out, plays) as (file, rows):
         left = {key: play for play in plays if (key := _key(*play)) not in rows}
@@ -83,7 +83,7 @@ def run(
 
 
 def missing(plays: Sequence[Play], out: Path) -> int:
-    """Count the plays that are not in a folder yet."""
+    """Count the plays without a row in the folder."""
     with _rows_in(out, plays) as (_, rows):
         return sum(_key(*play) not in rows for play in plays)
 
@@ -93,35 +93,35 @@ def _key(cell: Cell, seed: int) -> str:
 
 
 def _line(cell: Row, seed: int, measured: Row) -> str:
-    """Write a row; numbers that are not finite are null, as JSON has none."""
+    """Return a row as a line of JSON; numbers that are not finite become null."""
     own = cell | {"seed": seed}
     if other := [name for name in own if name in measured and measured[name] != own[name]]:
         raise ExperimentError(
-            f"The trial of {cell} with seed {seed} measures {other[0]!r}, a name of the cell: give it another."
+            f"The trial of {cell} with seed {seed} returns {other[0]!r}, a name of its cell: rename that measure."
         )
     try:
         return json.dumps(plain(own | measured), allow_nan=False)
     except (TypeError, ValueError) as error:
-        raise ExperimentError(f"The row of {cell} with seed {seed} is not of plain values: {error}.") from error
+        raise ExperimentError(f"The row of {cell} with seed {seed} cannot be JSON: {error}.") from error
 
 
 @contextmanager
 def _kept_in(out: Path) -> Iterator[None]:
-    """Say which folder it is where rows cannot be read or written."""
+    """Name the folder in the error where rows cannot be read or written."""
     try:
         yield
     except OSError as error:
         raise ExperimentError(
-            f"Rows could not be kept in {out} ({error.strerror or error}): remove the cause, and the same command with"
-            " the same --out goes on; or give another --out."
+            f"Rows could not be kept in {out} ({error.strerror or error}): remove the cause and run the same command"
+            " with the same --out to go on, or give another --out."
         ) from error
 
 
 @contextmanager
 def _rows_in(out: Path, plays: Sequence[Play]) -> Iterator[tuple[IO[bytes], dict[str, Row]]]:
-    """Open a folder's rows of such plays to read them and to append more: no other run may have them open.
+    """Open a folder's rows to read and append; the lock keeps other runs out.
 
-    A last line that was not written whole, by a process that was killed, is taken away.
+    A last line that a killed process left incomplete is removed.
     """
     place, names = out / ROWS, tuple(plays[0][0]) if plays else ()
     with _kept_in(out):
@@ -155,7 +155,7 @@ def _read(number: int, line: bytes, names: tuple[str, ...], place: Path) -> tupl
 def _played(
     trial: Trial, plays: list[Play], executor: Executor | None, at_once: int
 ) -> Iterator[tuple[Cell, int, Row]]:
-    """Give each play with what it came to, as it comes."""
+    """Yield each play with its result, in the order in which the plays end."""
     if executor is None:
         for cell, seed in plays:
             yield cell, seed, trial(cell, seed)
@@ -174,8 +174,8 @@ def _played(
     except futures.BrokenExecutor as error:
         played = " or ".join(f"{cell} with seed {seed}" for cell, seed in running.values())
         raise ExperimentError(
-            f"A worker process was killed, for want of memory perhaps, while it played {played}. All finished plays are"
-            " kept: the same command with the same --out goes on."
+            f"A worker process was killed, perhaps for lack of memory, while it played {played}. All finished plays are"
+            " kept: run the same command with the same --out to go on."
         ) from error
     finally:
         for future in running:
@@ -184,12 +184,12 @@ def _played(
 
 @contextmanager
 def workers(processes: int | None = None, scheduler: str = "") -> Iterator[tuple[Executor | None, int]]:
-    """Give an executor, and how many plays it takes at once: `run(..., *workers)`.
+    """Yield an executor and the number of plays it takes at once: `run(..., *workers)`.
 
     Args:
         processes: worker processes of this machine; None: one for each processor; 1: this process itself.
         scheduler: address of a dask scheduler, `tcp://HOST:PORT`, whose workers play instead. They need this package in
-            the same version, and the folder of the results where streams or recordings are kept in it.
+            the same version, and access to the folder of the results if recordings are written there.
     """
     if processes is not None and processes < 1:
         raise ExperimentError(f"The number of processes is {processes}: give 1 or more.")
@@ -222,21 +222,21 @@ def _cluster(scheduler: str) -> Iterator[tuple[Executor, int]]:
         client = Client(scheduler, timeout=_CONNECT_S)
     except (OSError, ValueError) as error:
         raise ExperimentError(
-            f"No dask scheduler answers at {scheduler} ({error}): start one by `dask scheduler`, or leave it out."
+            f"No dask scheduler answers at {scheduler} ({error}): start one by `dask scheduler`, or omit --scheduler."
         ) from error
     with client:
         try:
-            # two for each thread, so that none waits while a row is on its way; workers may also come later
+            # two for each thread, so that no thread waits while a row travels; workers may also join later
             yield client.get_executor(), max(1, 2 * sum(client.nthreads().values()))
         except (KilledWorker, CancelledError, CommClosedError) as error:
             raise ExperimentError(
                 f"The scheduler at {scheduler} is gone, or a worker of it was killed ({error}). All finished plays are"
-                " kept: the same command with the same --out goes on."
+                " kept: run the same command with the same --out to go on."
             ) from error
 
 
 def _start() -> None:
-    """Leave a terminal's signals, Ctrl-Z too, to the parent, which ends the workers; do not outlive it if killed."""
+    """Leave the terminal's signals to the parent, which ends the workers; end with the parent if it is killed."""
     leave_to_parent()
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     Thread(target=_end_with_parent, daemon=True).start()
@@ -250,10 +250,10 @@ def _end_with_parent() -> None:
 
 
 def open_run(out: Path, arguments: Mapping[str, Any]) -> None:
-    """Make a folder for rows, or take one up that a run with the same arguments began.
+    """Create a folder for rows, or continue one of a run with the same arguments.
 
-    Raises ExperimentError for a folder that cannot be used, or that other arguments, another version or another commit
-    of this package began.
+    Raises ExperimentError for a folder that cannot be used, and for one of other arguments, another version or another
+    commit of this package.
     """
     own = json.loads(json.dumps({"version": __version__, "commit": commit(), **arguments}))
     place = out / RUN
@@ -277,7 +277,7 @@ def open_run(out: Path, arguments: Mapping[str, Any]) -> None:
 
 
 def commit() -> str | None:
-    """Return the commit of the clone that this package is in; None where none has it, though one may be around it."""
+    """Return the commit of the clone that tracks this package; None if the package is not in a clone."""
     git, file = shutil.which("git"), Path(__file__)
     if git is None or not any((parent / ".git").exists() for parent in file.parents):
         return None

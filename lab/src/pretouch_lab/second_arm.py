@@ -1,4 +1,4 @@
-"""A second arm in a simulated scene: it moves in the world of the first, but errs and senses by itself."""
+"""A second arm in a simulated scene: it shares the first arm's world, and has errors and sensors of its own."""
 
 from collections.abc import Callable
 
@@ -14,23 +14,23 @@ from pretouch.types import FloatArray, RobotState
 
 
 class SecondArm(ArmInWorld):
-    """An arm in another's world, whose `PlantClock` lets its time pass too.
+    """An arm in another arm's world; the first arm's `PlantClock` advances both.
 
-    Make it, build the first arm with its `spec` in the scene, then let it `join` that. Joint positions, torques and
-    its estimated force are in its own base frame; all that is true of contacts is in the world's.
+    Create it, build the first arm with its `spec` in the scene, then call `join`. Its estimated force is in its own
+    base frame. True contact forces are in the world frame.
     """
 
     def __init__(self, model: RobotModel, base: BasePose, params: PlantParams, seed: int) -> None:
         """Draw an arm that stands at `base`; the seed decides its errors and its noise."""
         super().__init__(model, params, seed)
         self.spec = SecondArmSpec(model, base, self.error)
-        """What the scene needs to know of it."""
+        """Model, base and errors of this arm for the scene."""
         self._base = base
         self._torques: tuple[FloatArray, FloatArray] | None = None
-        """Of the step under way."""
+        """Torques of the gears and of friction (n,), (n,) in the step under way [Nm]."""
 
     def join(self, first: Plant, q: FloatArray) -> None:
-        """Begin at rest at q (n,) [rad], in the world of an arm whose scene has the `spec`."""
+        """Start at rest at q (n,) [rad], in the world of an arm whose scene has the `spec`."""
         self._first, self.time = first, first.time
         built = first.mj_model
         before = body_before_second(built)
@@ -39,16 +39,16 @@ class SecondArm(ArmInWorld):
         first.before_each_step(self._begin)
 
     def before_each_step(self, call: Callable[[float], float | None]) -> None:
-        """Have `call(time)` run before each physics step, as `ArmInWorld` says."""
+        """Run `call(time)` before each physics step, see `ArmInWorld`."""
         self._first.before_each_step(call)
 
     def read(self) -> RobotState:
-        """Return what the arm's interface reports now."""
+        """Return the state that the arm's interface reports now."""
         self.catch_up()
         return super().read()
 
     def catch_up(self) -> None:
-        """Measure what the last physics step made of the arm, where time has passed since: `read` does it too."""
+        """Update sensors and errors after the last physics step, if time has passed since; `read` calls it."""
         if self._torques is None or self._first.time == self.time:
             return
         p, noise = self.params, self._noise * self._rng.standard_normal((2, self._n))

@@ -1,12 +1,12 @@
-"""Sweeps: what the numbers of the paper's experiments depend on, over a grid or by Sobol indices.
+"""Sweeps: influence of parameters on the measures of the paper's experiments, over a grid or by Sobol indices.
 
-Parameters are `GROUP.FIELD` of the profile, `plant.FIELD` of the simulated arm, `plant.kind` for a named one,
-`plant.world` for the arm and range finders that the seed draws of a set of the domain randomisation, `sensing.FIELD` of
-the range finders, `skin.units` for so many units spread over the arm, and `scene.FIELD` of the experiment.
+Parameters are `GROUP.FIELD` of the profile, `plant.FIELD` of the simulated arm, `plant.kind` for a named arm,
+`plant.world` for a set of the domain randomisation that the seed draws arm and range finders from, `sensing.FIELD` of
+the range finders, `skin.units` for the number of units spread over the arm, and `scene.FIELD` of the experiment.
 
 A seed is a simulated arm in a scene. A grid plays each combination with the same arms, so that two of its points differ
 by their parameters alone (common random numbers). For Sobol indices the arm is a column of the design, `seed`: its
-index says how much depends on the arm, and no parameter's index holds a part of that.
+index is the influence of the arm, and no parameter's index contains it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -63,7 +63,7 @@ class AvoidanceScene(Checked):
 
 @dataclass(frozen=True)
 class DynamicScene(Checked):
-    """The pushes of paper IV-C, which the seed alone decides."""
+    """The pushes of paper IV-C, drawn by the seed alone."""
 
 
 @dataclass(frozen=True)
@@ -71,19 +71,19 @@ class UnitCount(Checked):
     """Units of the skin."""
 
     units: Annotated[int, Check(low=0, high=64)] = 0
-    """How many are spread over the arm; 0: the seven of the paper's experiment."""
+    """Number of units spread over the arm; 0: the seven of the paper's experiment."""
 
 
 @dataclass(frozen=True)
 class Swept:
-    """An experiment that can be swept."""
+    """Defaults and measures of an experiment in a sweep."""
 
     profile: str
-    """Profile that it starts from, unless a sweep names another."""
+    """Profile to start from, unless the sweep names another."""
     scene: Checked
-    """Fields of its cells, `scene.FIELD`."""
+    """Default fields of its cells, `scene.FIELD`."""
     metrics: tuple[str, ...]
-    """Names of what is measured, of its rows."""
+    """Names of the measures in its rows."""
 
 
 _TOUCH = ("peak_estimate_n", "true_peak_n", "true_peak_20ms_n", "detection_delay_s", "missed", "false_detections")
@@ -96,13 +96,13 @@ EXPERIMENTS = {
 
 
 def _usual(name: str) -> dict[str, Any]:
-    """Return the parameters beside those of the profile, by the group in their names."""
+    """Return the default parameters outside the profile, by group."""
     skin, scene = UnitCount(), EXPERIMENTS[name].scene
     return {"plant": PlantParams(), "sensing": RangeFinderParams(), "skin": skin, "scene": scene}
 
 
 def setting(name: str, profile_text: str, values: Mapping[str, Value], seed: int) -> tuple[Row, Context]:
-    """Return an experiment's cell, and the arm and skin it is played with; an error names a value not allowed."""
+    """Return an experiment's cell and its arm and skin; an error names a value outside its range."""
     params = _usual(name)
     changes: dict[str, dict[str, str]] = {group: {} for group in params}
     for parameter, value in values.items():
@@ -111,7 +111,7 @@ def setting(name: str, profile_text: str, values: Mapping[str, Value], seed: int
             changes[group][field] = str(value)
         else:
             profile_text += f":{parameter}={value}"
-    profile(profile_text)  # refuses what is not allowed
+    profile(profile_text)  # raises ParameterError for values outside their range
     kind, world = changes["plant"].pop("kind", "nominal"), changes["plant"].pop("world", "")
     if kind not in scenario("arms"):
         raise ExperimentError(f"The arm plant.kind={kind} is unknown: choose from {', '.join(scenario('arms'))}.")
@@ -132,12 +132,12 @@ def skin_of(count: UnitCount) -> Skin:
 
 
 def trial(name: str, profile_text: str, cell: dict[str, Value], seed: int) -> Row:
-    """Play a cell; return its numbers, or why it failed, whatever it was."""
+    """Play a cell; return its measures, or the reason of a failure."""
     metrics = EXPERIMENTS[name].metrics
     try:
         played, context = setting(name, profile_text, cell, seed)
         row = experiment(name).trial(played, seed, context)[0]
-    except Exception as error:  # it is written down, and the others go on
+    except Exception as error:  # the row has the reason, and the other cells go on
         reason = str(error) if isinstance(error, PretouchError) else f"{type(error).__name__}: {error}"
         return {"failed": reason or type(error).__name__, **dict.fromkeys(metrics)}
     touches = row.get("contacts", [{"detected": row.get("detection_delay_s") is not None}] * row["contact"])
@@ -147,7 +147,7 @@ def trial(name: str, profile_text: str, cell: dict[str, Value], seed: int) -> Ro
 
 @dataclass(frozen=True)
 class Dimension:
-    """One swept parameter: some values to choose from, or a range of numbers, as it was written."""
+    """One swept parameter: a list of values, or a range of numbers."""
 
     name: str
     text: str
@@ -155,13 +155,13 @@ class Dimension:
     low: float = 0.0
     high: float = 1.0
     log: bool = False
-    """Whether it is spread evenly by its logarithm."""
+    """True for values evenly spaced by their logarithm."""
     whole: bool = False
     levels: int = 5
-    """Values of a range that a grid takes."""
+    """Number of values of a range on a grid."""
 
     def at(self, part: float) -> Value:
-        """Return the value at a part of the range, from 0 to 1; each choice and each whole number has as much of it."""
+        """Return the value at a fraction of the range, 0 to 1; choices and whole numbers have equal shares of it."""
         if self.choices:
             return self.choices[min(int(part * len(self.choices)), len(self.choices) - 1)]
         wide = 0.5 if self.whole and not self.log else 0.0
@@ -170,7 +170,7 @@ class Dimension:
         return int(np.clip(round(value), self.low, self.high)) if self.whole else value
 
     def grid(self) -> list[Value]:
-        """Return the values that a grid takes, both ends among them."""
+        """Return the values on a grid, both ends included."""
         if self.choices:
             return list(self.choices)
         spaced = np.geomspace if self.log else np.linspace
@@ -179,7 +179,7 @@ class Dimension:
 
 
 def dimension(name: str, text: str, now: object) -> Dimension:
-    """Read what a parameter, which is `now` otherwise, is varied over. Raises ExperimentError."""
+    """Read the range or the values of a parameter whose default is `now`. Raises ExperimentError."""
     if ":" not in text:
         return Dimension(name, text, tuple(value_of(word.strip()) for word in text.split(",")))
     begin, end, *more = text.split(":")
@@ -195,7 +195,7 @@ def dimension(name: str, text: str, now: object) -> Dimension:
 
 
 def value_of(text: str) -> Value:
-    """Read a number as one, and anything else as a text."""
+    """Read a number as int or float, and other text as str."""
     for kind in (int, float):
         try:
             return kind(text)
@@ -214,19 +214,19 @@ class SweepPlan:
     fixed: dict[str, Value]
     design: Design
     samples: int
-    """Base points of the Sobol sequence; a grid has its levels."""
+    """Base points of the Sobol sequence; a grid uses `Dimension.levels`."""
     seeds: range
 
     @property
     def columns(self) -> list[Dimension]:
-        """Columns of the Sobol design: what is varied, and the arm if there are several."""
+        """Columns of the Sobol design: the swept parameters, and `seed` if there are several arms."""
         arm = [Dimension("seed", f"{len(self.seeds)} arms", tuple(self.seeds))] if len(self.seeds) > 1 else []
         return [*self.vary, *arm]
 
     def plays(self) -> list[Play]:
-        """Return the cells with their seeds in the order of the design; an ExperimentError for one not allowed.
+        """Return the cells with their seeds in the order of the design. Raises ExperimentError for a cell out of range.
 
-        For Sobol indices these are `samples` blocks of D + 2: Saltelli's A, A with each column from B, and B.
+        For Sobol indices they form `samples` blocks of D + 2: Saltelli's A, A with each column from B, and B.
         """
         if self.design == "sobol":
             from SALib.sample import sobol
@@ -243,22 +243,22 @@ class SweepPlan:
             try:
                 setting(self.experiment, self.profile, self.fixed | cell, seed)
             except PretouchError as error:
-                raise ExperimentError(f"{error} That is of the cell {cell}: narrow a range.") from error
+                raise ExperimentError(f"{error} The cell is {cell}: narrow a range.") from error
             plays.append((self.fixed | cell, seed))
         return plays
 
 
 def sweep_of(options: SweepOptions, vary: Mapping[str, str], fix: Mapping[str, str]) -> SweepPlan:
-    """Read a sweep, with ranges and values as on the command line. Raises an error of this package."""
+    """Read a sweep from ranges and values of the command line. Raises an error of this package."""
     name, samples, arms = options.experiment, options.samples, options.arms
     if name not in EXPERIMENTS:
         raise ExperimentError(f"The experiment {name!r} cannot be swept: choose from {', '.join(EXPERIMENTS)}.")
     if not vary:
-        raise ExperimentError("Nothing is varied: give --vary NAME=LOW:HIGH, detect.f_base_n=5:15 for one.")
+        raise ExperimentError("Nothing is varied: give --vary NAME=LOW:HIGH, for example detect.f_base_n=5:15.")
     if both := [parameter for parameter in vary if parameter in fix]:
-        raise ExperimentError(f"The parameter {both[0]} is both varied and fixed: do one of them.")
+        raise ExperimentError(f"The parameter {both[0]} is both varied and fixed: remove --vary or --fix for it.")
     if options.design == "sobol" and (samples < 2 or samples & (samples - 1)):
-        raise ExperimentError(f"The number of samples is {samples}: give a power of two, 64 for one.")
+        raise ExperimentError(f"The number of samples is {samples}: give a power of two, for example 64.")
     first, last = _SEED_RANGES[options.seeds]
     if not 1 <= arms <= last - first + 1:
         raise ExperimentError(f"The number of arms is {arms}: give 1 to {last - first + 1}.")
@@ -274,16 +274,16 @@ def sweep_of(options: SweepOptions, vary: Mapping[str, str], fix: Mapping[str, s
 
 
 def problem(columns: list[Dimension]) -> dict[str, Any]:
-    """Return the columns as SALib names them: parts of their ranges, from 0 to 1."""
+    """Return the columns as SALib's problem: fractions of their ranges, 0 to 1."""
     names = [one.name for one in columns]
     return {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
 
 
 def sobol_indices(columns: list[Dimension], numbers: Sequence[float | None]) -> list[Row]:
-    """Return first-order and total index of each column, of numbers (samples * (D + 2),) in the order of the design.
+    """Return first-order and total index of each column, from numbers (samples * (D + 2),) in the order of the design.
 
-    A block in which a number is missing is left out whole, for its differences are what the indices are made of. Of
-    what does not vary there are no indices.
+    A block with a missing number is left out: the indices are sums over the differences within a block. A measure that
+    does not vary has no indices.
     """
     from SALib.analyze import sobol
 
@@ -302,7 +302,7 @@ def sobol_indices(columns: list[Dimension], numbers: Sequence[float | None]) -> 
 
 
 def results_of(sweep: SweepPlan, rows: list[Row], metrics: Sequence[str]) -> dict[str, list[Row]]:
-    """Return indices by metric, or over a grid the course by parameter, of rows in the order of the design."""
+    """Return indices by metric, or for a grid summaries by parameter, from rows in the order of the design."""
     if sweep.design == "sobol":
         return {metric: sobol_indices(sweep.columns, [row[metric] for row in rows]) for metric in metrics}
     return {one.name: summary(rows, [one.name], metrics) for one in sweep.vary}

@@ -1,4 +1,4 @@
-"""Rows as tables: groups, quantiles, exact bounds, ratios to a baseline, and columns that are declared as values."""
+"""Rows as tables: groups, quantiles, exact bounds, ratios to a baseline, and columns declared as values."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,19 +12,19 @@ from pretouch_lab.run import Row
 
 
 def rounded(value: float, digits: int = 3) -> float:
-    """Round for a table; what is dropped is far below any error of the measure."""
+    """Round for a table; the lost digits are far below the error of any measure."""
     return round(float(value), digits)
 
 
 def peak(values: FloatArray) -> float:
-    """Largest value, 0 of none."""
+    """Largest value, 0 without values."""
     return float(values.max(initial=0.0))
 
 
 def spread(values: Iterable[float | None]) -> Row | None:
-    """Return median and 10-90 % of what is not None; None of none.
+    """Return median and 10-90 % of the values that are not None; None without such values.
 
-    What did not end is infinite: quantiles are then the nearest of the values, and an infinite one is written None.
+    Times without an end are infinite. Quantiles are then the nearest values, and infinite quantiles become None.
     """
     some = np.array([value for value in values if value is not None], np.float64)
     if not len(some):
@@ -35,12 +35,12 @@ def spread(values: Iterable[float | None]) -> Row | None:
 
 
 def finite(value: float) -> float | None:
-    """Return a number as JSON may hold it: what never ended is None."""
+    """Return a number for JSON; infinite and NaN become None."""
     return rounded(value, 4) if np.isfinite(value) else None
 
 
 def grouped(rows: Iterable[Row], by: Sequence[str]) -> list[tuple[Row, list[Row]]]:
-    """Return rows that share the values of some names, each group with those values, in the order of their first."""
+    """Return groups of rows with equal values of some names, each with these values, in order of first appearance."""
     groups: dict[tuple[Any, ...], list[Row]] = {}
     for row in rows:
         groups.setdefault(tuple(row.get(name) for name in by), []).append(row)
@@ -48,7 +48,7 @@ def grouped(rows: Iterable[Row], by: Sequence[str]) -> list[tuple[Row, list[Row]
 
 
 def summary(rows: Iterable[Row], by: Sequence[str], spreads: Sequence[str], totals: Sequence[str] = ()) -> list[Row]:
-    """Return a row for each group: `trials`, spreads of measures, sums of counts and of flags. None counts in none."""
+    """Return a row for each group: `trials`, spreads of measures, sums of counts and flags. None is left out."""
     return [
         {
             **key,
@@ -63,14 +63,14 @@ def summary(rows: Iterable[Row], by: Sequence[str], spreads: Sequence[str], tota
 def ratios(
     rows: Iterable[Row], to: Mapping[str, Any], same: Sequence[str], measures: Sequence[str], inverse: bool = False
 ) -> list[Row]:
-    """Return rows with `NAME_ratio`: each measure as a part of that of its twin, None where either is None or zero.
+    """Return rows with `NAME_ratio`: each measure over that of the row's twin, None where either is None or zero.
 
     Args:
         rows: of trials.
-        to: values that tell the twins from the others.
+        to: values that mark the twins.
         same: names whose values a row and its twin share, the seed among them.
-        measures: names of what is compared.
-        inverse: how many times smaller than the twin's a measure is, in place of its part.
+        measures: names of the measures.
+        inverse: divide the twin's measure by the row's.
     """
     every = list(rows)
     twins = {tuple(row[name] for name in same): row for row in every if to.items() <= row.items()}
@@ -87,26 +87,26 @@ def ratios(
 
 
 def median_bounds(values: Sequence[float]) -> tuple[float, float]:
-    """95 % bounds on a median: those of the sorted values between which it lies, whatever they are distributed like."""
-    from scipy.stats import quantile_test  # half a second, which workers that only play do without
+    """95 % bounds on a median, two of the sorted values; they hold for any distribution."""
+    from scipy.stats import quantile_test  # half a second, which workers do not need
 
     interval = quantile_test(values, p=0.5).confidence_interval(0.95)
     low, high = float(interval.low), float(interval.high)
-    # of fewer than six values no two are sure to have it between them: their range is the most there is to say
+    # fewer than six values have no such pair: the bounds are their range
     return min(values) if np.isnan(low) else low, max(values) if np.isnan(high) else high
 
 
 def share_below(events: int, of: int) -> float:
-    """95 % upper bound on a share of which so many of so many were counted (Clopper and Pearson)."""
+    """95 % upper bound on a share with `events` counted among `of` (Clopper and Pearson)."""
     from scipy.stats import binomtest
 
     return float(binomtest(events, of).proportion_ci(0.95, "exact").high) if of else 1.0
 
 
 def rate_bounds(events: float, hours: float, dispersion: float = 1.0) -> tuple[float, float]:
-    """95 % bounds on a rate [1/h] of which `events` were counted in some hours: exact for a Poisson count (Garwood).
+    """95 % bounds on a rate [1/h] with `events` counted in `hours`: exact for a Poisson count (Garwood).
 
-    Where counts scatter `dispersion` times as much as Poisson counts do, so many events tell as much as one.
+    Counts whose variance is `dispersion` times that of Poisson counts weigh as `events / dispersion` Poisson events.
     """
     from scipy.stats import chi2
 
@@ -116,35 +116,35 @@ def rate_bounds(events: float, hours: float, dispersion: float = 1.0) -> tuple[f
 
 
 def dispersion_of(counts: Sequence[int]) -> float:
-    """Variance of counts by their mean, 1 for Poisson counts and taken as 1 where it is less or unknown."""
+    """Variance of counts over their mean, at least 1: Poisson counts have 1."""
     mean = float(np.mean(counts)) if counts else 0.0
     return max(1.0, float(np.var(counts, ddof=1)) / mean) if len(counts) > 1 and mean > 0 else 1.0
 
 
 @dataclass(frozen=True)
 class Column:
-    """One column of a table: which value of a row it shows, and how."""
+    """One column of a table: a value of each row and its format."""
 
     heading: str
     """With the unit."""
     key: str
-    """Name of the value: a text, a number, or a `spread`, of which the median is shown."""
+    """Name of the value: a text, a number, or a `spread` whose median is shown."""
     digits: int | None = None
-    """Behind the point; None: the value as it is."""
+    """Digits behind the point; None: the value unchanged."""
     factor: float = 1.0
     band: bool = False
-    """Whether 10-90 % of a spread of several values stand below its median."""
+    """True to show 10-90 % of a spread of several values below its median."""
     of: str = ""
-    """Name of the whole that it is a count of."""
+    """Name of the total of a count."""
     second: str = ""
-    """Name of a text that stands below it."""
+    """Name of a text to show below the value."""
 
     def text(self, row: Row) -> str:
-        """Return its cell of a row: a dash for what there is not, `>` for what did not end."""
+        """Return the cell of a row: a dash for None, `>` for a time without an end."""
         value = row[self.key]
-        shown = "-" if value is None else self._spread(value) if isinstance(value, dict) else self._number(value)
+        main = "-" if value is None else self._spread(value) if isinstance(value, dict) else self._number(value)
         return (
-            shown
+            main
             + (f"/{row[self.of]}" if self.of and value is not None else "")
             + (f"\n{row[self.second]}" if self.second else "")
         )
@@ -161,12 +161,12 @@ class Column:
         if value is None:
             return ">"
         digits = self.digits if digits is None else digits
-        # no minus before a zero
+        # + 0.0 removes the minus of a zero
         return str(value) if digits is None else f"{round(self.factor * value, digits) + 0.0:.{digits}f}"
 
 
 def table(title: str, columns: Sequence[Column], rows: Iterable[Row], note: str = "", names: int = 1) -> TextTable:
-    """Write each row in each column; the first `names` columns hold names."""
+    """Return a table with a line for each row; the first `names` columns hold names."""
     cells = tuple(tuple(column.text(row) for column in columns) for row in rows)
     return TextTable(title, tuple(column.heading for column in columns), cells, note, names)
 
@@ -174,12 +174,12 @@ def table(title: str, columns: Sequence[Column], rows: Iterable[Row], note: str 
 def medians(
     title: str, columns: Sequence[Column], rows: Iterable[Row], by: Sequence[str], note: str = "", names: int = 1
 ) -> TextTable:
-    """Group rows of trials by names, and write medians of the columns that have digits and sums of the others."""
+    """Return a table of groups of trials: medians in columns with digits, sums in the others."""
     spreads = [column.key for column in columns if column.digits is not None]
     counts = {key for column in columns if column.digits is None for key in (column.key, column.of)}
     return table(title, columns, summary(rows, by, spreads, [*counts - {"", "trials", *by}]), note, names)
 
 
 def short(value: float) -> str:
-    """Write a number with two digits that count."""
+    """Return a number with two significant digits."""
     return f"{value:.2g}" if value < 9.95 else f"{value:.0f}"

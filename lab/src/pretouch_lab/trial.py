@@ -1,4 +1,4 @@
-"""One trial: an arm in a scene under the controller, and everything it left behind."""
+"""One trial: an arm in a scene under the controller, and its record."""
 
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -32,48 +32,48 @@ from pretouch_lab.domain_randomisation import Parts, randomised
 from pretouch_lab.run import Row
 
 Trace = tuple[Row, RunRecord]
-"""A cell with the course of its trial."""
+"""A cell with the time course of its trial."""
 SETTLE_S = 0.2
-"""Time the arm stands before the controller starts [s]: the observer's transient is over."""
+"""Standstill before the controller starts [s]: the observer's transient ends within it."""
 
 
 @dataclass(frozen=True)
 class Setup:
-    """What a trial is made of."""
+    """Arm, skin, profile, scene and path of a trial."""
 
     model: RobotModel
     skin: Skin
-    """Where the units truly sit: these measure."""
+    """Units at their true places: these measure."""
     profile: Profile
     scene: SceneSpec
     path: Path
     seed: int
     believed: Skin | None = None
-    """Where the controller believes the same units to be, in the same order; none, and it knows the truth. A recording
-    holds what it believes."""
+    """The same units in the same order at the places that the controller assumes; None: the true ones. A recording has
+    the assumed places."""
     hand: HandScript | None = None
     person: PersonArm = field(default_factory=PersonArm)
-    """What moves the hand."""
+    """Arm of the person that moves the hand."""
     plant: PlantParams = field(default_factory=PlantParams)
     ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
     recording: FilePath | None = None
-    """File to record it in; none, and it is not recorded."""
+    """File for the recording; None: no recording."""
     world: str = ""
-    """Set of the domain randomisation (`sim.randomisation`) of which the seed draws one; none: plant, ranging and skin
-    as they are."""
+    """Set of the domain randomisation (`sim.randomisation`) that the seed draws from; empty: plant, ranging and skin
+    stay as given."""
     commander: Callable[[Plant, Hand | None], Callable[[], Desired | None]] | None = None
-    """Makes what is asked for a desired motion in each step; none, and the arm follows the path."""
+    """Returns a function that gives the desired motion of each step; None: the arm follows the path."""
     prepare: Callable[[Plant, RangeFinders], object] | None = None
-    """What else is to happen: may have things done before each physics step, to the arm or to its units."""
+    """Called once with plant and units, to register calls before each physics step."""
     start: FloatArray | None = None
-    """Joint positions (n,) in which it begins [rad]; None: those in which its path does."""
+    """Joint positions (n,) at the start [rad]; None: those at the start of the path."""
     controller: Callable[..., Controller] = Controller
-    """Makes its controller, as `Controller` is made."""
+    """Class of the controller, with the arguments of `Controller`."""
 
 
 @dataclass(frozen=True)
 class Record:
-    """What a trial left behind."""
+    """Steps, true forces and contacts of a trial."""
 
     steps: list[ControlStep]
     true_time: FloatArray
@@ -94,7 +94,7 @@ class Record:
         return np.array([s.force for s in self.steps])
 
     def first_contact(self, after: float = 0.0) -> float | None:
-        """Instant [s] at which the true force first passes 1 N after a time [s], or None."""
+        """Instant [s] at which the true force first exceeds 1 N after a time [s], or None."""
         touching = np.flatnonzero((np.linalg.norm(self.true_force, axis=1) > TOUCH_N) & (self.true_time > after))
         return float(self.true_time[touching[0]]) if len(touching) else None
 
@@ -103,18 +103,18 @@ class Record:
         return [s for s in self.steps if s.contact is not None]
 
     def beginnings(self) -> list[tuple[ControlStep, FloatArray]]:
-        """Return the steps in which a reaction began, each with the first velocity (3,) [m/s] that came of it.
+        """Return the steps in which a reaction began, each with the first velocity (3,) [m/s] of that reaction.
 
-        That may be some steps later, where a joint at rest has to be torn loose; 0 if the arm never moved.
+        The motion may begin some steps later, after static friction; the velocity is 0 if the arm never moved.
         """
         return [(s, _first_velocity(self.steps[i:])) for i, s in enumerate(self.steps) if s.contact is not None]
 
     def started(self) -> int:
-        """Index of the first step in which the arm does not hold, as it does while its window fills."""
+        """Index of the first step after the hold at the start, in which the force window fills."""
         return next((i for i, s in enumerate(self.steps) if s.mode is not Mode.HOLD), len(self.steps))
 
     def held(self) -> bool:
-        """Whether the arm held for another reason than filling its window at the start."""
+        """True if the arm held after the start, when the force window was full."""
         return any(s.mode is Mode.HOLD for s in self.steps[self.started() :])
 
 
@@ -125,13 +125,13 @@ def _first_velocity(steps: list[ControlStep]) -> FloatArray:
 
 
 def trace_of(record: Record) -> RunRecord:
-    """Return what a trial left behind as arrays."""
+    """Return the record of a trial as arrays."""
     truth, contacts = TrueForces(record.true_time, record.true_force), tuple(contacts_of(record.steps))
     return RunRecord(**columns_of(record.steps), contacts=contacts, truth=truth)
 
 
 class _TrialRecorder:
-    """Keeps each step, and where the hand was; all of it in a recording too, if there is one."""
+    """Collects each step and the hand's position, and writes both to a recording if there is one."""
 
     def __init__(self, plant: Plant, hand: Hand | None, recording: Recording | None) -> None:
         self._plant, self._hand, self._recording = plant, hand, recording
@@ -146,7 +146,7 @@ class _TrialRecorder:
             self._recording.record(cycle, self._truth())
 
     def _truth(self) -> Truth:
-        """What the physics did since the last cycle."""
+        """Return the true forces and contacts since the last cycle."""
         plant = self._plant
         forces, touches = plant.true_log[self._forces :], plant.touches[self._touches :]
         self._forces, self._touches = len(plant.true_log), len(plant.touches)
@@ -154,10 +154,10 @@ class _TrialRecorder:
 
 
 class SimulatedTrial:
-    """The arm of a setup in its scene under its controller: it stands, and its observer's transient is over."""
+    """The arm of a setup in its scene under its controller, at rest after the observer's transient."""
 
     def __init__(self, setup: Setup) -> None:
-        """Build it, as its seed draws it of a world if one is named."""
+        """Build arm, skin and controller; the seed draws them from the world of the setup, if any."""
         own = Parts(setup.plant, setup.ranging, setup.skin, setup.believed)
         parts = randomised(setup.world, setup.seed, setup.model, own)
         model, scene = setup.model, setup.scene
@@ -177,20 +177,20 @@ class SimulatedTrial:
         self.plant.advance(SETTLE_S)
 
     def run(self, recorder: Recorder, done: Callable[[ControlStep], bool], options: Options | None = None) -> None:
-        """Turn it until `done` says so of a step."""
+        """Run control cycles until `done(step)` is true."""
         run(self.controller, self.plant, self.skin, self.clock, recorder, done, options or Options())
 
 
 def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
-    """Run a trial until `done` says so of a step. A recording that could not be kept whole is a RecordingError."""
-    made = SimulatedTrial(setup)
-    plant, about = made.plant, {"seed": setup.seed, "scene": described(setup.scene)}
+    """Run a trial until `done(step, plant)` is true. Raises RecordingError for an incomplete recording."""
+    trial = SimulatedTrial(setup)
+    plant, about = trial.plant, {"seed": setup.seed, "scene": described(setup.scene)}
     if setup.world:
         about["world"] = setup.world
-    with Recording(setup.recording, made.controller, about) if setup.recording else nullcontext() as recording:
-        recorder = _TrialRecorder(plant, made.hand, recording)
-        options = Options(desired=setup.commander(plant, made.hand)) if setup.commander else None
-        made.run(recorder, lambda step: done(step, plant), options)
+    with Recording(setup.recording, trial.controller, about) if setup.recording else nullcontext() as recording:
+        recorder = _TrialRecorder(plant, trial.hand, recording)
+        options = Options(desired=setup.commander(plant, trial.hand)) if setup.commander else None
+        trial.run(recorder, lambda step: done(step, plant), options)
     if recording and recording.trouble:
         raise RecordingError(recording.trouble)
     return Record(

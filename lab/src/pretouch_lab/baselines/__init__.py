@@ -1,1 +1,1 @@
-"""What Pretouch is compared with: parts by entry points, and the profiles of each benchmark."""
+"""Baselines of the benchmarks: parts of profiles by entry points, and profiles."""

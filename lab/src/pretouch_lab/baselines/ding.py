@@ -1,9 +1,9 @@
 """Ding and Thomas, "Collision avoidance with proximity servoing for redundant serial robot manipulators", ICRA 2020.
 
-Limits on the approach of each closest point, and a weighted sum of the distances that must not fall.
+It limits the approach of each closest point, and keeps a weighted sum of the distances from falling.
 
-What of it is reproduced, and what not, stands in docs/explanation/baselines.md. The values are those in the code of the
-authors of arXiv 2510.24683, who compare it with their own controller.
+docs/explanation/baselines.md states which parts are reproduced. The values are those in the code of the authors of
+arXiv 2510.24683, who compare it with their own controller.
 """
 
 from dataclasses import dataclass, replace
@@ -19,29 +19,29 @@ from pretouch.robot.kinematics import Kinematics
 from pretouch.types import FloatArray, Obstacles, RobotState
 
 _WEIGHT = 1000.0
-"""Of a row's squared violation, as that of the paper's rows. The rows are soft: as hard ones, which they are in a box
-without acceleration limits, they ask an arm at rest for a retreat that no arm can have reached after one period."""
+"""Weight of a row's squared violation, equal to that of the paper's rows. The rows are soft: hard rows would demand of
+an arm at rest a retreat that it cannot reach within one period."""
 
 
 @dataclass(frozen=True)
 class Ding(Restriction, name="ding"):
-    """Limits on the approach, and a sum of distances that must not fall."""
+    """Limits on the approach, and a weighted sum of distances that must not fall."""
 
     repulse_m: Positive = 0.17
     """Body distance below which the retreat is fastest [m]."""
     zero_low_m: Positive = 0.22
-    """Body distance from which no retreat is asked [m]."""
+    """Body distance above which no retreat is demanded [m]."""
     zero_high_m: Positive = 0.25
-    """Body distance up to which no approach is allowed [m]."""
+    """Body distance below which no approach is allowed [m]."""
     notice_m: Positive = 0.3
-    """Body distance from which an approach is not limited [m]."""
+    """Body distance above which the approach has no limit [m]."""
     approach_m_s: Positive = 0.2
     """Largest approach, just within `notice_m` [m/s]."""
     retreat_m_s: Positive = 0.2
     """Fastest retreat, below `repulse_m` [m/s]."""
     weighted_m: NonNegative = 4.0
-    """Body distance up to which an obstacle enters the weighted sum of distances that must not fall [m]: as published
-    all that is seen. With 0.3 it holds where the approach is limited, and with 0 not at all."""
+    """Body distance below which an obstacle enters the weighted sum of distances [m]. The published method uses every
+    obstacle in view; 0.3 uses those whose approach is limited, and 0 uses none."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -53,7 +53,7 @@ class Ding(Restriction, name="ding"):
         self, state: None, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
         request: MotionRequest,
     ) -> tuple[Restricted, None]:  # fmt: skip
-        """Return rows for the points that are near, and the one of all."""
+        """Return a row for each near point, and the row of the weighted sum."""
         near = zip(obstacles.link, obstacles.body_point, obstacles.direction, strict=True)
         rows = [d @ body.model.jacobian(kin, int(link), at)[:3] for link, at, d in near]
         return self.within(np.reshape(rows, (-1, body.model.n)), obstacles.body_distance), None
@@ -61,7 +61,7 @@ class Ding(Restriction, name="ding"):
     def limit(self, distance: FloatArray) -> FloatArray:
         """Largest approach (K,) [m/s] at body distances (K,) [m], infinite from `notice_m` on; negative: a retreat.
 
-        Piecewise linear: full retreat, none, neither, and the full approach at the outer end.
+        Piecewise linear: full retreat, zero, zero, and the full approach at the outer end.
         """
         places = [self.repulse_m, self.zero_low_m, self.zero_high_m, self.notice_m]
         limit = np.interp(distance, places, [-self.retreat_m_s, 0.0, 0.0, self.approach_m_s])
@@ -70,7 +70,7 @@ class Ding(Restriction, name="ding"):
     def within(self, rows: FloatArray, distance: FloatArray) -> Restricted:
         """Return G qd <= h, the last row of which belongs to no point.
 
-        With C = -rows, how each distance changes with the joints, and w = 1 / d, the last is -w^T C qd <= 0: the
+        With C = -rows, the change of each distance with the joints, and w = 1 / d, the last row is -w^T C qd <= 0: the
         weighted sum of the distances must not fall. It is divided by the sum of w, so that its violation is a speed.
 
         Args:
@@ -85,4 +85,4 @@ class Ding(Restriction, name="ding"):
 
 _DETECT = MovingThresholds(f_d_n=0.0)
 DING = replace(profile("paper"), name="ding", slow=None, approach=Ding(), detect=_DETECT)
-"""The profile `ding`: contacts are detected as without proximity, and nothing else slows the arm."""
+"""The profile `ding`: contact detection ignores proximity, and nothing else slows the arm."""

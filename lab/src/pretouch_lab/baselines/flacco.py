@@ -1,10 +1,10 @@
 """Flacco, Kroeger, De Luca, Khatib, "A depth space approach to human-robot collision avoidance", ICRA 2012.
 
-A repulsive velocity moves the end-effector, and near other points of the body the joints that carry these towards an
-obstacle are slowed.
+A repulsive velocity moves the end-effector. Near other points of the body it slows the joints that move these points
+towards an obstacle.
 
-What of it is reproduced, and what not, stands in docs/explanation/baselines.md. The values are those in the code of the
-authors of arXiv 2510.24683, who compare it with their own controller.
+docs/explanation/baselines.md states which parts are reproduced. The values are those in the code of the authors of
+arXiv 2510.24683, who compare it with their own controller.
 """
 
 from dataclasses import dataclass, replace
@@ -19,12 +19,12 @@ from pretouch.robot.kinematics import Kinematics
 from pretouch.types import WHOLE, FloatArray, Obstacles, RobotState
 
 _STILL = 1e-9
-"""Part of a joint in a motion below which it has none [rad/m]."""
+"""Joint velocity per speed of a point below which the joint does not count [rad/m]."""
 
 
 @dataclass(frozen=True)
 class Flacco(Restriction, name="flacco"):
-    """A repulsive velocity of the end-effector, and slower joints."""
+    """A repulsive velocity of the end-effector, and lower limits of joint velocities."""
 
     v_max_m_s: Positive = 0.4
     """Largest repulsive velocity of the end-effector V_max [m/s]. An older draft of that code has 0.21."""
@@ -33,8 +33,8 @@ class Flacco(Restriction, name="flacco"):
     rho_m: Positive = 0.4
     """Distance rho beyond which there is practically no repulsion [m]."""
     size_m: NonNegative = 0.0
-    """Taken off the distances from the end-effector origin [m]: as published the repulsion knows no size of the hand.
-    0.1 is about half the width of the Panda's."""
+    """Subtracted from the distances to the end-effector origin [m]. The published repulsion ignores the hand's size;
+    0.1 is about half the width of the Panda's hand."""
 
     def step(
         self, state: None, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
@@ -54,10 +54,10 @@ class Flacco(Restriction, name="flacco"):
         return np.asarray(1.0 / (1.0 + np.exp(exponent)))
 
     def velocity(self, position: FloatArray, obstacles: Obstacles) -> FloatArray:
-        """Velocity (3,) [m/s] that moves the end-effector's origin, at `position` (3,) [m], away from what is near.
+        """Velocity (3,) [m/s] that moves the end-effector's origin, at `position` (3,) [m], away from obstacles.
 
-        The hybrid vector of the paper: as long as the repulsion of the nearest point, in the direction of the sum of
-        the repulsions of all.
+        It is the paper's hybrid vector: the length of the nearest point's repulsion, in the direction of the sum of all
+        repulsions.
         """
         if len(obstacles.unit) == 0:
             return np.zeros(3)
@@ -70,11 +70,11 @@ class Flacco(Restriction, name="flacco"):
     def slowed(self, motion: FloatArray, distance: FloatArray, qd_max: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint velocity limits (n,) [rad/s] by the risk f of each of K body points.
 
-        Joints that take part in moving a point towards its obstacle may turn that way at (1 - f) of their speed. Of
-        several points the strictest limit holds.
+        A joint that moves a point towards its obstacle may turn that way at (1 - f) of its speed. The strictest limit
+        of several points holds.
 
         Args:
-            motion: (K, n) least joint velocities that move each point towards its obstacle, and nowhere else [rad/m].
+            motion: (K, n) least joint velocities that move each point straight towards its obstacle [rad/m].
             distance: (K,) of each point [m].
             qd_max: (n,) [rad/s].
         """
@@ -87,4 +87,4 @@ class Flacco(Restriction, name="flacco"):
 
 _DETECT = MovingThresholds(f_d_n=0.0)
 FLACCO = replace(profile("paper"), name="flacco", slow=None, approach=Flacco(), detect=_DETECT)
-"""The profile `flacco`: contacts are detected as without proximity, and nothing else slows the arm."""
+"""The profile `flacco`: contact detection ignores proximity, and nothing else slows the arm."""
