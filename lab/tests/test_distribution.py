@@ -17,12 +17,9 @@ from pretouch_lab.sweep import SWEEP
 PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
 
 
-def test_it_is_of_the_products_version_and_needs_that():
+def test_it_is_of_the_products_version_and_its_commands_are_those_the_product_names():
     assert PROJECT["version"] == pretouch.__version__
     assert PROJECT["dependencies"] == [f"pretouch[figures]=={pretouch.__version__}"]
-
-
-def test_its_commands_are_those_the_product_names():
     assert sorted(PROJECT["entry-points"][GROUP]) == sorted(commands_of(LAB))
     assert set(commands_of(LAB)) <= set(plugins.names(GROUP))
     for name in commands_of(LAB):

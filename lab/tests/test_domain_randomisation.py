@@ -19,12 +19,8 @@ MODEL = RobotModel(panda())
 PARTS = Parts(PlantParams(), RangeFinderParams(), paper_skin(MODEL), None)
 
 
-def test_without_a_world_nothing_changes():
-    assert randomised("", 1001, MODEL, PARTS) is PARTS
-    assert folder_part("") == sentence("") == ""
-
-
 def test_a_world_changes_arm_sensors_and_what_is_believed_of_the_skin():
+    assert randomised("", 1001, MODEL, PARTS) is PARTS
     parts = randomised("realistic", 1001, MODEL, PARTS)
     assert parts.plant != PARTS.plant
     assert parts.ranging != PARTS.ranging
@@ -44,7 +40,7 @@ def test_the_nominal_world_plays_as_the_usual_one():
     assert static.trial(cell, 1003, replace(context, world="realistic"))[0] != usual
 
 
-def test_runs_of_two_worlds_do_not_share_a_folder(tmp_path):
+def test_runs_of_two_worlds_and_of_a_file_that_changed_do_not_share_a_folder(tmp_path):
     open_run(tmp_path / "a", arguments("static", TrialOptions()))
     with pytest.raises(ExperimentError, match="holds a run with world = '', not 'stress'"):
         open_run(tmp_path / "a", arguments("static", TrialOptions(world="stress")))
@@ -52,9 +48,6 @@ def test_runs_of_two_worlds_do_not_share_a_folder(tmp_path):
     benchmarks._folder(DetectionOptions(out=out, world="stress"), "detection")
     with pytest.raises(ExperimentError, match="holds a run with world = 'stress', not ''"):
         benchmarks._folder(DetectionOptions(out=out), "detection")
-
-
-def test_a_world_file_that_changed_is_another_world(tmp_path):
     place = tmp_path / "mine.toml"
     place.write_text("[plant.mass_error]\nvalue = 0.1\n")
     open_run(tmp_path / "run", arguments("static", TrialOptions(world=str(place))))
@@ -65,7 +58,10 @@ def test_a_world_file_that_changed_is_another_world(tmp_path):
 
 def test_folders_are_named_by_their_world(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    stressed = benchmarks._folder(DetectionOptions(world="stress", quick=True), "detection")
-    usual = benchmarks._folder(DetectionOptions(), "detection")
-    assert (stressed.name, usual.name) == ("bench-detection-stress-quick", "bench-detection")
+    assert (
+        benchmarks._folder(DetectionOptions(world="stress", quick=True), "detection").name
+        == "bench-detection-stress-quick"
+    )
+    assert benchmarks._folder(DetectionOptions(), "detection").name == "bench-detection"
+    assert folder_part("") == sentence("") == ""
     assert folder_part("here/arm.toml") != folder_part("there/arm.toml")

@@ -26,37 +26,22 @@ ROWS = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("values", "count", "means"), [([1.0, 2.0, 6.0, 4.0], 2, [1.5, 4.0, 5.0]), ([1.0, 3.0], 20, [2.0]), ([], 20, [])]
-)
-def test_a_moving_mean_by_numbers_is_the_mean_of_less_than_a_window(values, count, means):
-    np.testing.assert_allclose(mean_over(np.array(values), count), means)
-
-
-def test_peak_and_spread_by_numbers_and_of_nothing():
+def test_peak_and_spread_by_numbers_of_nothing_and_of_what_did_not_end():
+    for values, count, means in (([1.0, 2.0, 6.0, 4.0], 2, [1.5, 4.0, 5.0]), ([1.0, 3.0], 20, [2.0]), ([], 20, [])):
+        np.testing.assert_allclose(mean_over(np.array(values), count), means)
     assert (peak(np.zeros(0)), peak(np.array([1.0, 7.0, 2.0]))) == (0.0, 7.0)
     assert spread(float(v) for v in range(11)) == {"median": 5.0, "p10": 1.0, "p90": 9.0, "n": 11}
     assert spread([None]) is None
-
-
-def test_what_did_not_end_counts_as_the_longest():
     assert spread([1.0, 2.0, np.inf]) == {"median": 2.0, "p10": 1.0, "p90": None, "n": 3}
     assert spread([np.inf, None]) == {"median": None, "p10": None, "p90": None, "n": 1}
 
 
 def test_groups_have_what_their_rows_share_and_what_they_sum_up_to():
-    assert [(key, [row["seed"] for row in group]) for key, group in grouped(ROWS, ["name"])] == [
-        ({"name": "a"}, [0, 1]),
-        ({"name": "b"}, [0, 1]),
-    ]
+    groups = [(key["name"], [row["seed"] for row in group]) for key, group in grouped(ROWS, ["name"])]
+    assert groups == [("a", [0, 1]), ("b", [0, 1])]
     first, second = summary(ROWS, ["name", "text"], ["force"], ["hit"])
-    assert first == {
-        "name": "a",
-        "text": "x",
-        "trials": 2,
-        "hit": 1,
-        "force": {"median": 2.0, "p10": 2.0, "p90": 2.0, "n": 1},
-    }
+    force = {"median": 2.0, "p10": 2.0, "p90": 2.0, "n": 1}
+    assert first == {"name": "a", "text": "x", "trials": 2, "hit": 1, "force": force}
     assert second["force"]["median"] == 2.5
     assert summary([], ["name"], ["force"]) == []
 

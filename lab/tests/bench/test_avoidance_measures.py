@@ -45,24 +45,18 @@ def test_clamping_is_the_largest_mean_over_half_a_second_of_unbroken_contact():
     assert measures.clamping(time[:0], force[:0]) == 0.0
 
 
-def test_contact_by_numbers():
+def test_contact_by_numbers_with_the_persons_own_speed_and_none_without():
     steps = [step(i, force=np.array([0.0, 12.0 if i > 100 else 3.0, 0.0])) for i in range(200)]
-    made = record(steps, [(1.0, 1.01, 40.0)], [Touch(1.001, 8, np.array([0.0, -0.3, 0.0]))])
-    row = measures.contact(made, np.arange(200) >= 40, towards)
+    standing = record(steps, [(1.0, 1.01, 40.0)], [Touch(1.001, 8, np.array([0.0, -0.3, 0.0]))])
+    row = measures.contact(standing, np.arange(200) >= 40, towards)
     assert row["first_contact_s"] == pytest.approx(0.601)  # near from 0.4 s on, touched at 1.001 s
     assert row["impact_speed_m_s"] == pytest.approx(0.3)
     assert row["peak_estimate_n"] == pytest.approx(12.0)
     assert row["true_peak_20ms_n"] == pytest.approx(20.0)
     assert row["clamping_force_n"] == 0.0
-
-
-def test_the_persons_own_speed_is_part_of_the_impact():
     hand = np.array([[0.0, -0.5 + 0.002 * i, 0.0] for i in range(200)])  # 0.2 m/s towards the arm
-    made = record([step(i) for i in range(200)], [(1.0, 1.1, 5.0)], [Touch(1.001, 8, np.zeros(3))], hand)
-    assert measures.contact(made, np.ones(200, bool), towards)["impact_speed_m_s"] == pytest.approx(0.2)
-
-
-def test_without_contact_there_are_no_figures_of_one():
+    coming = record(steps, [(1.0, 1.1, 5.0)], [Touch(1.001, 8, np.zeros(3))], hand)
+    assert measures.contact(coming, np.ones(200, bool), towards)["impact_speed_m_s"] == pytest.approx(0.2)
     row = measures.contact(record([step(i) for i in range(50)]), np.ones(50, bool), towards)
     assert not row["contact"]
     assert row["first_contact_s"] is row["impact_speed_m_s"] is row["peak_estimate_n"] is None
@@ -82,15 +76,12 @@ def test_the_cycle_time_is_that_of_the_second_turn():
     assert measures.tracking(steps, 0.0) == {"tracking_rms_m": 0.03, "speed_m_s": None, "cycle_time_s": None}
 
 
-def test_jerk_by_numbers():
+def test_jerk_and_holds_by_numbers():
     # a command that grows by 0, 1, 0, 1, ... mrad/s in a step: |jerk| = 0.001 / 0.01^2 = 10 rad/s^3
     speed = np.cumsum(np.arange(300) % 2) * 0.001
     steps = [step(i, command=np.full(7, v)) for i, v in enumerate(speed)]
     assert measures.jerk(steps, 0.01) == pytest.approx(10.0)
     assert measures.jerk(steps[:2], 0.01) == 0.0
-
-
-def test_holds_are_counted_with_their_events():
     modes = [Mode.TRACK] * 5 + [Mode.HOLD] * 20 + [Mode.TRACK] * 5 + [Mode.HOLD] * 3
     steps = [step(i, mode=m, event=Event.SKIN_SILENT) for i, m in enumerate(modes)]
     held = {"holds": 2, "held_s": pytest.approx(0.23), "hold_events": {"skin_silent": 2}}
@@ -108,20 +99,17 @@ def test_reactions_are_judged_by_the_true_force_before_them():
     assert row == {"reactions": 3, "false_reactions": 2, "towards_person": 1}
 
 
-def test_a_span_without_way_is_stuck_only_if_it_is_clear_throughout():
+def test_a_livelock_is_no_way_for_long_with_nothing_in_the_way():
     phase = np.array([0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 3.0])
     clear = np.ones(7, bool)
     np.testing.assert_array_equal(stuck_for(phase, clear, 3, 0.5), [False, True, True, True, True, False, False])
     clear[2] = False
     assert not stuck_for(phase, clear, 3, 0.5).any()
-
-
-def test_a_livelock_is_no_way_with_nothing_in_the_way():
     path = SimpleNamespace(point=lambda s: np.array([0.0, s, 0.0]))
     setting = SimpleNamespace(setup=SimpleNamespace(path=path), shape=lambda hand: Ball(hand, 0.05))
-    told = {"advance_m": 0.02, "within_s": 1.0, "clear_m": 0.2, "ahead_m": 0.3}
+    limits = {"advance_m": 0.02, "within_s": 1.0, "clear_m": 0.2, "ahead_m": 0.3}
     steps = [step(i) for i in range(400)]
     far, near = np.tile([0.0, -1.0, 0.0], (400, 1)), np.tile([0.0, 0.4, 0.0], (400, 1))
-    assert livelocks(record(steps, hand=far), setting, told) == {"livelocks": 1, "livelock_s": pytest.approx(4.0)}
-    assert livelocks(record(steps, hand=near), setting, told) == {"livelocks": 0, "livelock_s": 0.0}
+    assert livelocks(record(steps, hand=far), setting, limits) == {"livelocks": 1, "livelock_s": pytest.approx(4.0)}
+    assert livelocks(record(steps, hand=near), setting, limits) == {"livelocks": 0, "livelock_s": 0.0}
     assert livelocks(record(steps, hand=far), setting, None) == {"livelocks": None, "livelock_s": None}

@@ -62,11 +62,13 @@ def test_the_arm_wanders_from_rest_to_rest_within_its_limits():
     assert np.abs(wandering(1001, 60.0).q[0] - course.q[0]).max() > 0.1
 
 
-def test_contacts_are_those_of_the_goals():
+def test_contacts_are_those_of_the_goals_and_links_that_the_same_joints_move_are_one_body():
     _, touches = planned(1000)
     assert len(touches) == 40
     assert all(touch.force_n >= 15.0 and touch.duration_s >= 0.1 for touch in touches)
     assert len({touch.link for touch in touches}) == 8
+    names = [name_of(model().link_index(f"panda_{link}")) for link in ("link3", "link7", "link8", "hand")]
+    assert names == ["link3", "hand", "hand", "hand"]
 
 
 def test_an_arm_has_the_same_seed_with_each_skin(monkeypatch):
@@ -79,11 +81,6 @@ def test_an_arm_has_the_same_seed_with_each_skin(monkeypatch):
     rows = rows_of([cell | {"seed": seed} | trial(cell, seed) for cell, seed in arms])
     assert [row["skin"] for row in rows if row["seed"] == 1000][:3] == ["32 units", "none", "none, nothing learnt"]
     assert len(plays("published", quick=False)) == 24 * 3
-
-
-def test_links_that_the_same_joints_move_are_one_body():
-    names = [name_of(model().link_index(f"panda_{link}")) for link in ("link3", "link7", "link8", "hand")]
-    assert names == ["link3", "hand", "hand", "hand"]
 
 
 def test_a_contact_is_judged_by_its_body_and_its_place_100_ms_after_its_beginning_and_at_its_end(replay):

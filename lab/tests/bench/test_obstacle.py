@@ -8,29 +8,23 @@ from pretouch_lab.bench.avoidance_scenes import Walker, travelled
 from pretouch_lab.bench.obstacle import Ball, Cuboid, least_distance, nearest
 
 
-def test_a_walker_brakes_to_rest_at_the_end_and_goes_slower_with_no_room_to_brake():
+def test_a_walker_goes_straight_brakes_to_rest_at_the_end_and_goes_slower_with_no_room_to_brake():
     # 0.8 m/s and 4 m/s^2: 0.2 s and 0.08 m to brake, so 0.92 m in 1.15 s before
     times = [-1.0, 0.0, 0.5, 1.15, 1.25, 1.35, 9.0]
     expected = [0.0, 0.0, 0.4, 0.92, 0.92 + 0.08 - 0.02, 1.0, 1.0]
     np.testing.assert_allclose([travelled(t, 1.0, 0.8) for t in times], expected, atol=1e-12)
     # sqrt(2 * 4 * 0.02) = 0.4 m/s, which is 0.1 s to brake
     assert travelled(0.1, 0.02, 2.0) == pytest.approx(0.02)
-
-
-def test_a_walker_goes_straight():
     walker = Walker(np.array([0.0, -0.5, 0.6]), np.array([0.0, 0.1, 0.6]), 0.15, 1.0, 100.0)
     goal = walker.goal(2.0, np.zeros(3), None)
     np.testing.assert_allclose(goal.position, [0.0, -0.35, 0.6])
     assert goal.force_max == 100.0
 
 
-def test_distances_from_a_ball_by_numbers():
+def test_distances_from_a_ball_and_a_box_by_numbers():
     distance, to = Ball(np.array([0.0, 0.0, 1.0]), 0.2).closest(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.9]]))
     np.testing.assert_allclose(distance, [0.8, -0.1])
     np.testing.assert_allclose(to, [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]])
-
-
-def test_distances_from_a_box_by_numbers():
     box = Cuboid(np.zeros(3), np.array([1.0, 2.0, 3.0]))
     distance, to = box.closest(np.array([[2.0, 0.0, 0.0], [4.0, 6.0, 0.0], [0.9, 0.0, 0.0]]))
     np.testing.assert_allclose(distance, [1.0, 5.0, -0.1])
@@ -41,13 +35,12 @@ def test_distances_from_a_box_by_numbers():
 def test_the_nearest_point_of_the_arm_to_a_ball_is_that_of_the_controllers_own_geometry(panda_model, center):
     kin = panda_model.kinematics(panda_model.description.q_ready)
     ball = Ball(np.array(center), 0.05)
-    found = nearest(kin, panda_model.body, ball)
-    other = closest_points(
-        kin, panda_model.body, np.zeros(3), np.zeros(1, np.int64), ball.center[None], np.array([[0.0, 0.0, 1.0]])
-    )
-    assert found.distance == pytest.approx(float(other.body_distance[0]) - 0.05, abs=1e-3)
-    assert found.link == other.link[0]
-    np.testing.assert_allclose(found.direction, other.direction[0], atol=0.05)
+    ours = nearest(kin, panda_model.body, ball)
+    aside = np.array([[0.0, 0.0, 1.0]])
+    other = closest_points(kin, panda_model.body, np.zeros(3), np.zeros(1, np.int64), ball.center[None], aside)
+    assert ours.distance == pytest.approx(float(other.body_distance[0]) - 0.05, abs=1e-3)
+    assert ours.link == other.link[0]
+    np.testing.assert_allclose(ours.direction, other.direction[0], atol=0.05)
 
 
 def test_the_least_distance_of_many_postures_is_that_of_each_alone(panda_model):

@@ -102,15 +102,10 @@ def test_a_table_of_the_glove_gives_measured_torques_its_label_and_its_folders_l
         GLOVE.read([file])
 
 
-@pytest.mark.parametrize("count", range(2, 8))
-def test_no_run_is_judged_by_what_was_learnt_from_it_and_each_is_judged_once(count):
-    for learn, judge in halves(count):
-        assert learn
-        assert not set(learn) & set(judge)
-    assert sorted(run for _, judge in halves(count) for run in judge) == list(range(count))
-
-
-def test_a_single_recording_is_cut_so_that_its_halves_are_judged_apart(motions):
+def test_no_run_is_judged_by_what_was_learnt_from_it_each_is_judged_once_and_a_single_one_is_cut(motions):
+    for count in range(2, 8):
+        assert all(learn and not set(learn) & set(judge) for learn, judge in halves(count))
+        assert sorted(run for _, judge in halves(count) for run in judge) == list(range(count))
     first, second = parted([run_of(motions[0])])
     np.testing.assert_array_equal([*first.time, *second.time], motions[0].time)
 
@@ -238,13 +233,10 @@ def test_a_folder_without_a_set_says_what_was_looked_for_and_where_it_comes_from
     assert "nobody" in capsys.readouterr().err
 
 
-def test_streams_keep_their_runs_apart(stream):
+def test_streams_keep_their_runs_apart_and_currents_are_read_as_such(stream, motions, panda_model):
     some = stream.only([2, 0])
     change = np.flatnonzero(np.diff(some.run))
     assert some.run[change].tolist() == [2]
     assert np.diff(some.recording.time)[change] == pytest.approx(1.0)
     assert np.isnan(some.recording.tau_ext[change + 1]).all()
-
-
-def test_currents_are_read_as_such(motions, panda_model):
     assert stream_of(replace(UR10E, arm="panda"), [run_of(motions[0])], panda_model).recording.kind == "current"
