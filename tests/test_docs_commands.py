@@ -98,8 +98,11 @@ def single_commands(words: Sequence[str]) -> Iterator[list[str]]:
 
 def check_python(words: Sequence[str]) -> None:
     """Check that a clone has the program, and that the program knows its options."""
-    place = ROOT / (words[1].replace(".", "/") if words[0] == "-m" else words[0])
-    sources = [path for path in (place, place.with_suffix(".py"), *place.glob("*.py")) if path.is_file()]
+    name = words[1].replace(".", "/") if words[0] == "-m" else words[0]
+    places = (ROOT / name, ROOT / "lab/src" / name)
+    sources = [
+        path for place in places for path in (place, place.with_suffix(".py"), *place.glob("*.py")) if path.is_file()
+    ]
     assert sources, words
     text = "\n".join(path.read_text() for path in sources)
     assert [word for word in words[1:] if word.startswith("--") and f'"{word}"' not in text] == []

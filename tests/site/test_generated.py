@@ -26,7 +26,7 @@ def test_every_command_is_shown_with_its_options():
 
 def test_every_parameter_is_shown_with_default_unit_and_source():
     page = parameters_page()
-    assert "| `f_base_n` | 10 | N | Base force F_b above the mean that makes a contact, eq. 9 (Table I). |" in page
+    assert "| `f_base_n` | 10 | N | Base force F_b of a contact above the mean, eq. 9 (Table I). |" in page
     assert "## MovingThresholds\n" in page
     assert "## ThresholdParams\n" not in page  # the same parameters, of the class that has them
     assert page.count("\n| `") == sum(len(fields(kind)) for kind in parameter_sets())
