@@ -152,7 +152,7 @@ class RangeFinder(Watched):
             self._start(self._device.recalibrate)
 
     def _take(self, now):
-        """Note the measurement. It ended after the last moment at which none can have been there.
+        """Store the measurement. It ended after the last look that found none.
 
         The next cannot end sooner than most of a period after this one, which bounds its age even if nobody looks.
         """

@@ -14,7 +14,7 @@ class TextTable:
     rows: tuple[tuple[str, ...], ...]
     note: str
     names: int = 2
-    """How many columns at the left hold names, not numbers."""
+    """Number of columns at the left that hold names."""
 
 
 Column = tuple[str, Callable[[Any], str]]

@@ -21,7 +21,7 @@ from pretouch_fci.state import StateDatagram
 from pretouch_fci.wire import PORT, PROTOCOLS
 
 _LATE_S = 0.003
-"""A machine that is later than this leaves the time out [s]: states in a burst could not be answered in time."""
+"""Delay from which the robot's time stands [s]: a client could not answer a burst of states in time."""
 _DATAGRAMS_MOST = 256
 """So many datagrams are looked at in one go: a flood must not stop the clock."""
 _FIRST_WAITS_S = (0.25, 0.75)

@@ -1,4 +1,4 @@
-"""Arms as unkind as real ones in the detection benchmark."""
+"""Arms with the flaws of real ones in the detection benchmark."""
 
 from collections import Counter
 from dataclasses import replace

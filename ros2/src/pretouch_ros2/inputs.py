@@ -11,9 +11,9 @@ from pretouch_ros2.params import ArmParams
 from pretouch_ros2.stamps import SourceStamps
 
 _NAMES_MOST = 1000
-"""Joints of a message; one with more is nobody's whose joints are ours."""
+"""Most joints of a message; a longer message is ignored."""
 _OTHERS_MOST = 64
-"""Joints of others that are kept: whoever publishes ever other names must not fill the memory."""
+"""Most names of other joints that are stored: a publisher of ever new names must not fill the memory."""
 _EE_FRAMES = ("_k", "_ee", "_tcp", "_hand", "link8", "tool0", "_flange")
 """How the names of end-effectors' frames end."""
 

@@ -65,7 +65,7 @@ def check_free(what: str, place: Path, replace: bool) -> None:
 
 
 def same_file(one: Path, other: Path) -> bool:
-    """Return True if `other` is the file `one` by another name, be it there or not, or lies in the folder `one`."""
+    """Return True if both paths lead to the same file, existing or not, or `other` lies in the folder `one`."""
     if one.exists() and other.exists() and one.samefile(other):
         return True
     first, second = Path(os.path.realpath(one)), Path(os.path.realpath(other))
@@ -74,7 +74,7 @@ def same_file(one: Path, other: Path) -> bool:
 
 @contextmanager
 def numbers_to(place: str | Path | None) -> Iterator[Callable[[Any], None]]:
-    """Give what writes a command's numbers as JSON, where --json says: a file, '-', or nowhere for '' and None.
+    """Yield a function that writes a command's numbers as JSON to --json: a file, '-', or nothing for '' and None.
 
     With '-' they go to standard output, and all text that is printed in the context to standard error. Raises
     ExperimentError, at once, for a file that cannot be written.

@@ -93,7 +93,7 @@ class Plots:
         marks, force, captions = [("force", _FORCE), ("thresholds or bands", _GREY)], [], []
         for axis in "xyz":
             captions.append(self._caption(f"Force {axis} [N]", marks if axis == "x" else ()))
-            # a page whose scale is changed no longer follows the time: unseen lines hold it open
+            # a plot whose scale is set stops following the time, so invisible lines keep its range
             force.append(self._plot([_FORCE, _GREY, _GREY, _UNSEEN, _UNSEEN], 96, None, dashed=3))
         colours = [palette.css(palette.UNITS[i % len(palette.UNITS)]) for i in range(len(ids))]
         captions.append(self._caption("Distance [m]", zip(ids, colours, strict=True)))

@@ -245,7 +245,7 @@ def _maker(kind: type) -> Callable[[Any], Any]:
 
 
 def _way(name: str, hint: Any, rows: bool) -> Callable[[Any], Any]:
-    """Return what makes a field of a class from a message."""
+    """Return the function that makes a field of a class from a message."""
     get = attrgetter(name)
     if get_origin(hint) in (Union, UnionType):  # of a class and None
         (inner_hint,) = (inner for inner in get_args(hint) if inner is not NoneType)

@@ -74,7 +74,7 @@ class SimulatedUnit:
         self, key: UnitKey, params: UnitParams, rng: np.random.Generator, imu: ImuParams | None = None,
         reboots: Iterable[float] = (), zones: int = 1,
     ) -> None:  # fmt: skip
-        """Be on since a random time; out of session.
+        """Switch the unit on at a random time in the past; it has no session yet.
 
         Args:
             key: its name, number and key.

@@ -19,7 +19,7 @@ on the usual arm with the usual skin."""
 ABLATED_FREE, ABLATED_CONTACTS = "free: ablations", "contacts: ablations"
 """Of those, what ablations were given."""
 HARD, HARD_CONTACTS, UNTOLD = "hard: all", "hard, touched: all", "untold-load"
-"""Scenarios of the goals on arms as unkind as real ones, and the motion that is no part of it: its loads may give an
+"""Scenarios of the goals on arms with the flaws of real ones, and the motion that is no part of it: its loads may give an
 alarm each."""
 Groups = dict[str, Row]
 """Values that all rows of a group have, by the group's name."""
@@ -151,7 +151,7 @@ def contact_rows(contacts: list[Row], contenders: Sequence[Contender], groups: G
 
 
 def hard_rows(arms: list[Row], contenders: Sequence[Contender]) -> list[Row]:
-    """Return false alarms, delays and misses of each contender on arms as unkind as real ones, by motion."""
+    """Return false alarms, delays and misses of each contender on arms with the flaws of real ones, by motion."""
     groups: Groups = {
         HARD: {"told": True},
         **{f"{HARD}, {name}": {"told": True, "near": who} for name, who in _NEAR.items()},

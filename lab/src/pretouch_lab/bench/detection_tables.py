@@ -56,7 +56,7 @@ def tables(results: Row) -> list[TextTable]:
             " sensors, so that freeze_while_reacting and touch are not here.",
         ),
         table(
-            "Arms as unkind as real ones",
+            "Arms with the flaws of real ones",
             hard,
             _judged(rows, whole, HARD, HARD_CONTACTS),
             f"{note} The world hard: friction that remembers, gears that shake, joints that ring, drift, cables,"

@@ -1,4 +1,4 @@
-"""Arms as unkind as real ones, in motions other than circle and line: free, or touched (`scenarios/hard.toml`)."""
+"""Arms with the flaws of real ones, in motions other than circle and line: free, or touched (`scenarios/hard.toml`)."""
 
 from collections.abc import Callable
 

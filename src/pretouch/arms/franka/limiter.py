@@ -11,7 +11,7 @@ from pretouch.errors import RobotError
 
 PERIOD_S = 0.001
 _UNHEARD_S = 0.02
-"""So long may the arm go on as it does because commands are lost [s]: after so many in a row it stops by itself."""
+"""Longest time that the arm continues while commands are lost [s]: then it stops by itself."""
 _REST_RAD_S = 1e-9
 _ROUNDING = 1.0 + 1e-9
 _BRAKING = 0.7

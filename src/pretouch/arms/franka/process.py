@@ -182,7 +182,7 @@ class ArmServer:
         feedback = self._mailboxes.feedback.read()
         if feedback is not None:  # the motion's last state: there may be no other
             self._state, self._stamp = feedback.state, feedback.stamp
-        # what was asked during a motion ended it, and is not to be done at some later time
+        # requests during a motion have ended it, and must not be carried out later
         self._answered = (
             self._mailboxes.commands.read().number if command.request is ArmRequest.MOVE else command.number
         )

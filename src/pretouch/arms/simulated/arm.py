@@ -21,7 +21,7 @@ _SETTLE_S = 0.2
 _SLICE_S = 0.002
 """The simulation moves on by so much at once [s]: how late a datagram may leave."""
 _LATE_S = 0.1
-"""A machine that is later than this leaves the time out [s]: until then it makes up for it."""
+"""Delay up to which a late machine catches up [s]; with more the simulation skips the lost time."""
 _PERIOD_S = 0.002
 """Time in which a command reaches an arm that moves on by itself, and between two of its states [s]."""
 _STUCK_S = 1.0
