@@ -1,4 +1,4 @@
-"""Another arm beside this one, as what is known to move there."""
+"""A second arm as moving fixtures."""
 
 from collections.abc import Callable
 
@@ -11,7 +11,7 @@ from pretouch.types import SOMEWHERE, FloatArray, IntArray, MovingFixtures, Robo
 
 
 class OtherArm:
-    """Tells where another arm is by the newest state that it reported: what `loop.Options.moving` asks."""
+    """Source of another arm's capsules by its newest reported state, for `loop.Options.moving`."""
 
     def __init__(
         self,
@@ -20,7 +20,7 @@ class OtherArm:
         reported: Callable[[], RobotState | None],
         standing: Capsules | None = None,
     ) -> None:
-        """Know an arm.
+        """Take an arm and the source of its states.
 
         Args:
             model: of the other arm.
@@ -33,12 +33,12 @@ class OtherArm:
         self._standing = no_capsules() if standing is None else standing
 
     def __call__(self) -> MovingFixtures:
-        """Return where it is; before its first state, that it is somewhere."""
+        """Return its capsules; `SOMEWHERE` before its first state."""
         state = self._reported()
         return SOMEWHERE if state is None else self.at(state)
 
     def at(self, state: RobotState) -> MovingFixtures:
-        """Return where it is in a state of its own."""
+        """Return its capsules in a state."""
         model, still = self._model, self._standing
         kin, R, t = model.kinematics(state.q), self._T[:3, :3], self._T[:3, 3]
         link, a, b, _ = placed(model.capsules, kin)

@@ -22,7 +22,7 @@ WATCH_S = 3.0
 MEAN_S = 0.1
 """Time over which a force is averaged before it is judged [s]: one sample of a Panda's is off by up to 6 N."""
 DRIFT_RAD = 0.005
-"""How far a joint may move meanwhile [rad]."""
+"""Largest motion of a joint during the checks [rad]."""
 NEAR_LIMIT_RAD = 0.1
 """Distance to a joint's limit below which it is mentioned [rad]."""
 LEAST_ROOM_RAD = 0.004
@@ -254,7 +254,7 @@ def _floor(controller: Controller, floor: float) -> Iterator[Finding]:
 
 
 def check_start(controller: Controller, q: FloatArray) -> tuple[Finding, ...]:
-    """Say so if an arm at q (n,) [rad] is too far from where its path begins."""
+    """Return a finding if an arm at q (n,) [rad] is too far from the start of its path."""
     model, start, most = controller.model, controller.path.point(0.0), _NEAR_SHARE * controller.profile.task.off_path_m
     away = float(np.linalg.norm(model.kinematics(q).position[model.ee] - start))
     if away <= most:
@@ -268,7 +268,7 @@ def check_start(controller: Controller, q: FloatArray) -> tuple[Finding, ...]:
 
 @dataclass(frozen=True)
 class StandingArm:
-    """An arm that stands, and what is to move it."""
+    """An arm at rest, and the controller that is to move it."""
 
     arm: Arm
     skin: SkinPort
@@ -283,7 +283,7 @@ class StandingArm:
     """Time that this machine was too slow to simulate so far [s], where arm and units are simulated."""
 
     def check(self) -> tuple[Standstill, tuple[Finding, ...]]:
-        """Watch arm and units for some seconds; return what was seen of the arm, and what there is to know.
+        """Watch arm and units for some seconds; return the arm's states and the findings.
 
         Units that are not heard, and states that cannot be used, are an error at once.
         """
@@ -299,7 +299,7 @@ class StandingArm:
         return rest, (*check(c, rest, self.floor), *start, *wrong)
 
     def recheck(self, checked: Standstill) -> FloatArray:
-        """Return where the arm is by now (n,) [rad]; RobotError if that is not where it was checked, or may not move.
+        """Return the arm's joint positions (n,) [rad]; RobotError if it has moved since the checks, or may not move.
 
         `checked` is what `check` saw of it.
         """
@@ -317,7 +317,7 @@ class StandingArm:
         return q
 
     def demand_fit(self) -> None:
-        """Raise RobotError with all that the arm itself has against being moved."""
+        """Raise a RobotError with all reasons of the arm itself against moving."""
         against = self.arm.unfit()
         if against:
             raise RobotError(" ".join(against))

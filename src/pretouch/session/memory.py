@@ -44,7 +44,7 @@ _COOLING_S = 300.0  # an assumption
 
 @dataclass(frozen=True)
 class Identity:
-    """A robot, and through what it is spoken to: with any of it changed, the push is asked for again."""
+    """A robot and its connection: after a change of any field the push is requested again."""
 
     kind: str
     """Kind of arm, as `panda`, `fr3`, `ros2`."""
@@ -77,7 +77,7 @@ class ConfirmedRobots:
         return self._read().get(robot.key) == robot.connection
 
     def add(self, robot: Identity) -> None:
-        """Note that a robot is confirmed; RobotError where that cannot be written."""
+        """Store that a robot is confirmed; RobotError if that cannot be written."""
         entries = self._read() | {robot.key: robot.connection}
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -158,7 +158,7 @@ def load_learnt(path: Path, arm: RobotModel, p: SequentialParams) -> tuple[Resid
 
 
 def check_learnt(learnt: ResidualModel, arm: RobotModel) -> None:
-    """Refuse, by a ParameterError, what no free motion of an arm can be: believed, it would hide every contact.
+    """Refuse, by a ParameterError, a model that no free motion of an arm can have: it would hide every contact.
 
     Covariances are symmetric and positive definite, variances and counts not below zero. Offset, friction and noise of
     a joint stay within the torque it can give, the error of a link's mass within that mass, and an unknown load within
@@ -231,7 +231,7 @@ class FreeMotion:
     def __init__(
         self, file: ModelFile, controller: Controller, relearn: bool = False, now: Callable[[], float] = time.time
     ) -> None:
-        """Read what is known of the robot. A file that a person named and that cannot be used is a RobotModelError.
+        """Read the robot's model. A file that a person named and that cannot be used is a RobotModelError.
 
         Args:
             file: the file, which may be missing.
@@ -253,11 +253,11 @@ class FreeMotion:
             self.sentence = "This robot's free motion is learnt again from the beginning."
 
     def record(self, cycle: Cycle) -> None:
-        """Remember what is known after one turn of the loop."""
+        """Remember the model after one turn of the loop."""
         self._newest = cycle.after.learnt
 
     def save(self) -> tuple[str, ...]:
-        """Write what is known by now, if anything was learnt; return a sentence on it. Nothing is raised."""
+        """Write the model, if anything was learnt; return a sentence on it. Nothing is raised."""
         model, path = self._newest, self._file.path
         first = residual_init(self._model.n, self._params) if self.begin is None else self.begin
         if model is None or (np.array_equal(model.seen, first.seen) and np.array_equal(model.weights, first.weights)):

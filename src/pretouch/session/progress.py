@@ -84,7 +84,7 @@ class ProgressReporter:
             self._say(step, account.sentence)
 
     def _count_answer(self, step: ControlStep) -> None:
-        """Count a contact that has ended without a motion of the arm."""
+        """Count a contact that ended without a motion of the arm."""
         if step.contact is not None:
             self._answered = False
         self._answered = self._answered or answers(step)
@@ -92,7 +92,7 @@ class ProgressReporter:
             self.summary.unmoved, self._answered = self.summary.unmoved + 1, True
 
     def _note_near_contact(self, step: ControlStep) -> None:
-        """Say of a force that came near a contact and was none what it lacked: somebody may have pushed."""
+        """Report what a force near a contact lacked: somebody may have pushed."""
         nearest = self._nearest
         if step.mode is not Mode.TRACK or step.evidence < _GONE:
             self._nearest = None
@@ -110,7 +110,7 @@ class ProgressReporter:
 
 
 def lacked(step: ControlStep | None) -> str:
-    """Say what a contact would have taken in the step that was nearest to one, as the end of a sentence."""
+    """Return what the nearest step lacked for a contact, as the end of a sentence."""
     if step is None:
         return "no control step ran meanwhile"
     if step.mode is Mode.HOLD:
@@ -139,7 +139,7 @@ class PushOutcome:
         self._nearest: ControlStep | None = None
 
     def take(self, step: ControlStep) -> str:
-        """Take a step in; return what became of the push once that is known, '' before."""
+        """Take a step; return the outcome of the push once it is known, '' before."""
         if step.stamp < self._begin:
             return ""
         if self._nearest is None and step.mode is Mode.REACT and step.contact is None:

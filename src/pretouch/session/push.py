@@ -68,7 +68,7 @@ class PushEvaluator:
     """Evaluates one push, state by state."""
 
     def __init__(self, model: RobotModel, rest: Standstill, direction: Direction) -> None:
-        """Take the arm, what it measured at rest, and where it is pushed."""
+        """Take the arm, its measurements at rest, and the direction of the push."""
         self._model, self._axis = model, np.array(direction.axis)
         self._rest_wrench, self._rest_torque = rest.rest_wrench, rest.rest_torque
         self._least = max(FORCE_N, NOISE_SIGMAS * float(rest.noise.max()))
@@ -83,7 +83,7 @@ class PushEvaluator:
         return bool(np.linalg.norm(self.force) >= self._least)
 
     def take(self, state: RobotState) -> PushVerdict | None:
-        """Take a state in; return a verdict once a push has lasted long enough, and again each time it has."""
+        """Take a state; return a verdict once a push has lasted long enough, and again each time it has."""
         if state.wrench is None:
             return None
         wrench = state.wrench - self._rest_wrench

@@ -1,4 +1,4 @@
-"""The arm moves: slowly to where its path begins, then under the controller. However it ends, it is to end at rest."""
+"""Motion of the arm: slowly to the start of its path, then under the controller. It always ends at rest."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -55,12 +55,12 @@ class Ending:
         return bool(self.stopped or self.rest_unknown)
 
     def failed(self, arm: Arm, error: Exception) -> None:
-        """Note an error after which nobody knows whether the arm is at rest, and look whether it is."""
+        """Note an error after which the arm may move, and check whether it is at rest."""
         self.stopped = self.stopped or error_text(error)
         self.rest_unknown = "" if _is_at_rest(arm) else error_text(error)
 
     def sentences(self) -> tuple[str, ...]:
-        """Say it."""
+        """Return the end as sentences."""
         rest = "The arm is at rest." if self.rest_unknown == "" else ""
         if self.rest_unknown:
             rest = f"The arm may not be at rest: {self.rest_unknown} Check it, and press the user stop."
@@ -198,7 +198,7 @@ def execute(
     options: realtime.RealTimeOptions,
     ending: Ending,
 ) -> None:
-    """Let an arm that was checked move: to the start of its path, if there is a way to go, then under its controller.
+    """Move an arm that was checked: to the start of its path, if it is not there, then under its controller.
 
     What ends it early is written to `ending`. An error before anything has moved is raised.
     """
@@ -246,7 +246,7 @@ def go(
     recorder: Recorder = NO_RECORDER,
     left_out: Callable[[], float] = lambda: 0.0,
 ) -> None:
-    """Let an arm follow a plan, without a skin. A signal stops it, and is raised after it has come to rest.
+    """Move an arm along a plan, without a skin. A signal stops it, and is raised after it has come to rest.
 
     What the arm follows, and what ends it early, is `calibration.motion.follow`'s. `controller` gives arm and rate,
     `left_out` the time that this machine was too slow to simulate the arm so far [s].
@@ -276,7 +276,7 @@ def follow(
     options: realtime.RealTimeOptions,
     ending: Ending,
 ) -> None:
-    """Turn the controller until `done` says so, a signal comes, or something fails. The arguments are `realtime.run`'s.
+    """Run the controller until `done`, a signal or a failure. The arguments are `realtime.run`'s.
 
     Everything is compiled before the arm takes commands. A signal is raised after the arm has come to rest.
     """
@@ -294,7 +294,7 @@ def follow(
 
 
 def _run_motion(arm: Arm, move: Callable[[list[int]], str], ending: Ending) -> None:
-    """Let an arm take commands while `move` gives them; it is handed the signals that came, and says why it stopped."""
+    """Let an arm take commands from `move`, which receives the signals that came and returns why it stopped."""
     with noted_in_motion() as signals:
         try:
             arm.begin()
@@ -322,5 +322,5 @@ def _is_at_rest(arm: Arm) -> bool:
 
 
 def error_text(error: Exception) -> str:
-    """Say what an error says, and of one that is not ours, what it is."""
+    """Return the text of an error, with its type if it is not ours."""
     return str(error) if isinstance(error, PretouchError) else f"{type(error).__name__}: {error}"

@@ -16,16 +16,16 @@ _CLOSE_S = 1.0
 
 
 class BackgroundPrinter:
-    """Says sentences from a thread of its own: a terminal that is stopped must not stop an arm's loop."""
+    """Prints sentences from a thread of its own: a stopped terminal must not stop an arm's loop."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
-        """Take what says one sentence, and may block."""
+        """Take the function that prints one sentence and may block."""
         self._say = say
         self._sentences: SimpleQueue[str | None] = SimpleQueue()
         self._thread = threading.Thread(target=self._tell, daemon=True)
 
     def __call__(self, sentence: str) -> None:
-        """Have it said, soon."""
+        """Queue a sentence."""
         self._sentences.put(sentence)
 
     def __enter__(self) -> Self:
@@ -36,7 +36,7 @@ class BackgroundPrinter:
         self.close()
 
     def close(self) -> None:
-        """Wait a moment until all is said; a second time does nothing."""
+        """Wait a moment until all sentences are printed; a second call does nothing."""
         self._sentences.put(None)
         self._thread.join(_CLOSE_S)
 
@@ -77,12 +77,12 @@ def _standard_input() -> int | None:
 
 
 def say(sentence: str) -> None:
-    """Print it at once."""
+    """Print a sentence at once."""
     print(sentence, flush=True)
 
 
 def require_yes(question: str, otherwise: str) -> None:
-    """Have a person say yes; a RobotError with `otherwise` if none does."""
+    """Ask a person for yes; a RobotError with `otherwise` if nobody says it."""
     if not sys.stdin.isatty():
         raise RobotError("There is no terminal to ask for permission to move the arm: give --yes.")
     answer = ""

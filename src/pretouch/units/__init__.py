@@ -1,7 +1,7 @@
-"""The skin's sensor units on the network, as their receiver sees them, and simulated ones."""
+"""Sensor units on the network: their receiver, their health, and simulated units."""
 
 HOST = "127.0.0.1"
-"""Where sensor units send to, unless somebody says otherwise: only what runs on this machine is heard there, real units
+"""Default address that sensor units send to: only programs on this machine can reach it, real units
 need `EVERYWHERE`."""
 PORT = 29470
 """UDP port of the receiver: of those that IANA has assigned to nobody, and below those that a system gives to whoever

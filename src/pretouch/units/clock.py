@@ -20,7 +20,7 @@ class UnitClock:
     """Offset of one unit's clock, host time = unit time + offset, from its echoes. Times in seconds."""
 
     def __init__(self, drift: float, window: float) -> None:
-        """Know nothing yet.
+        """Begin without bounds.
 
         Args:
             drift: largest difference in rate between host and unit, as a fraction.
@@ -82,7 +82,7 @@ class UnitClock:
         return False
 
     def forget(self) -> None:
-        """Know nothing again; what was counted stays."""
+        """Reset the bounds; the counts stay."""
         self._lows.clear()
         self._highs.clear()
         self._newest, self.low, self.high, self.bounded = -math.inf, -math.inf, math.inf, False
@@ -120,6 +120,6 @@ def _insert(bounds: deque[tuple[float, float]], instant: float, bound: float) ->
 
 
 def _expire(bounds: deque[tuple[float, float]], oldest: float) -> None:
-    """Drop what is too old, but for the last one."""
+    """Drop the bounds that are too old, but for the last one."""
     while bounds[0][0] < oldest and len(bounds) > 1:
         bounds.popleft()

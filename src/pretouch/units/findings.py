@@ -25,10 +25,10 @@ Level = Literal["fault", "warning"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is wrong."""
+    """One fault or warning."""
 
     unit: str
-    """With which unit, or with what else."""
+    """Name of the unit, or of another part."""
     level: Level
     what: str
     """A word for programs, as `rate` or `battery`."""
@@ -40,7 +40,7 @@ _OF_TIME = frozenset({"rate", "range late", "loss", "imu rate", "imu loss", "lat
 
 
 def findings(units: Iterable[UnitHealth], params: HealthParams, late: float = 0.0) -> tuple[Finding, ...]:
-    """Return what is wrong, unit by unit, faults first.
+    """Return faults and warnings, unit by unit, faults first.
 
     Where the machine itself was `late` for longer than `machine_late_s` within the window [s], it comes first: in place
     of what may be its doing, and before units that are silent.
@@ -66,7 +66,7 @@ class _Findings(list[Finding]):
         self._unit = unit
 
     def add(self, level: Level, what: str, sentence: str) -> None:
-        """Add what is wrong."""
+        """Add a fault or warning."""
         self.append(Finding(self._unit, level, what, self._unit + sentence))
 
     def beyond(
@@ -106,7 +106,7 @@ def _of(unit: UnitHealth, params: HealthParams) -> list[Finding]:
 
 
 def _silence(unit: UnitHealth, params: HealthParams) -> str:
-    """Say why nothing comes of a unit, or ''."""
+    """Return the reason of a unit's silence, or ''."""
     if unit.silent_s <= params.silent_s:
         return ""
     if unit.traffic.state == "greeting":

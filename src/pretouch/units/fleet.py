@@ -1,4 +1,4 @@
-"""The simulated units of a skin, each behind its own UDP socket and its own stretch of a simulated network.
+"""Simulated units of a skin, each with its own UDP socket and its own simulated network channel.
 
 The network loses, delays, overtakes and doubles datagrams, as a wireless one does.
 """
@@ -39,13 +39,13 @@ class ChannelParams(Checked):
     delay_s: NonNegative = 0.008
     """Least delay [s]."""
     jitter_s: NonNegative = 0.004
-    """Mean of what is added to it [s], distributed as gamma."""
+    """Mean of the additional delay [s], which has a gamma distribution."""
     jitter_shape: Positive = 1.0
     """Shape of that distribution; 1 is exponential."""
     overtaken: Fraction = 0.0
     """Probability that a datagram is held up, so that later ones overtake it."""
     held_up_s: NonNegative = 0.05
-    """For how long it is held up [s]: two to three samples of a unit."""
+    """Time that it is held up [s]: two to three samples of a unit."""
     doubled: Fraction = 0.0
     """Probability that a datagram arrives twice, the second time after delays of its own."""
 
@@ -102,7 +102,7 @@ class FleetParams(Checked):
 
 
 class Fleet:
-    """All units of a skin. `step` moves them on; nothing happens in between."""
+    """All units of a skin. Only `step` advances them."""
 
     def __init__(
         self, units: NetworkUnits | Iterable[str], keys: Keys, params: FleetParams, seed: int, address: tuple[str, int]
@@ -135,7 +135,7 @@ class Fleet:
         self.sent = 0
         """Datagrams that reached the socket."""
         self.lost = 0
-        """Datagrams that the machine would not send, as while its network is down."""
+        """Datagrams that the machine refused to send, as while its network is down."""
 
     def mount(
         self,
@@ -192,7 +192,7 @@ class Fleet:
         self._rows[sample.unit][0].take_imu(sample)
 
     def step(self, clock: Callable[[], float]) -> int:
-        """Hand on what has come, do what is due, send what has arrived by now; return how many were sent.
+        """Deliver received datagrams, run the units, send what is due by now; return the number sent.
 
         `clock` gives the time [s]. It is asked once, after the sockets: no beacon is heard before it was sent.
         """
@@ -217,7 +217,7 @@ class Fleet:
             self.lost += 1
 
     def close(self) -> None:
-        """Give the sockets back."""
+        """Close the sockets."""
         for one in self._sockets:
             one.close()
 

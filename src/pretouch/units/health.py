@@ -16,7 +16,7 @@ from pretouch.units.wire import NO_TEMPERATURE, Flag, Sample, touch_part
 
 @dataclass(frozen=True)
 class HealthParams(Checked):
-    """Limits beyond which a unit is said to be faulty, or is warned of."""
+    """Limits of a unit's health: beyond them there is a warning or a fault."""
 
     window_s: Positive = 10.0
     """Time over which everything is counted [s]: some 500 samples; as long as a bound on the unit's clock counts."""
@@ -34,7 +34,7 @@ class HealthParams(Checked):
     """Largest share of samples lost on their way: the static experiment is shown to bear 10 %, and of 500 samples at
     10 % hardly ever more than 14 % are lost (three standard deviations)."""
     loss_fault: Fraction = 0.3
-    """Share lost up to which experiments were made: what comes after it nobody has tried."""
+    """Largest share of lost samples that experiments covered."""
     latency_s: Positive = 0.05
     """Largest median time from a measurement to its arrival [s]: a hand at 1.6 m/s comes 8 cm nearer in it."""
     latency_late_s: Positive = 0.1
@@ -93,7 +93,7 @@ _FEW = 5
 
 @dataclass(frozen=True)
 class UnitHealth:
-    """One unit over the last seconds. NaN where something is not known."""
+    """Health of one unit over the last seconds. NaN where a value is unknown."""
 
     unit: str
     traffic: UnitTraffic
@@ -130,7 +130,7 @@ class UnitHealth:
     restarts: int
     """Number of times that it initialised a sensor again within the window."""
     clock_unknown_s: float
-    """For how long its clock has not been known, within the window [s]; 0 while it is."""
+    """Time for which its clock has been unknown, within the window [s]; 0 while it is known."""
     range_late: int
     """Samples that said the range finder was late."""
     imu_rate_hz: float
@@ -142,9 +142,9 @@ class UnitHealth:
     clock_jumps: int
     """Within the window."""
     touched: float = math.nan
-    """Share of its touch readings that said it is touched; NaN of a unit that tells of no touch sensor."""
+    """Share of its touch readings with a touch; NaN for a unit without a touch sensor."""
     touch_failed: float = 0.0
-    """Share of its touch readings that said the sensor has failed."""
+    """Share of its touch readings with a failed sensor."""
 
 
 class Lateness:

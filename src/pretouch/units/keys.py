@@ -45,7 +45,7 @@ class UnitKey:
             raise HardwareError(f"The key of unit {self.id} is {size}, not {KEY_SIZE} bytes: make one with new_key().")
 
     def __repr__(self) -> str:
-        """Without the key: it must not get into logs."""
+        """Return a text without the key, which must not get into logs."""
         return f"UnitKey(id={self.id!r}, number={self.number})"
 
     @property
@@ -55,7 +55,7 @@ class UnitKey:
 
 
 class Keys(dict[str, UnitKey]):
-    """Keys of units by name, which nobody changes; two of one name, number or key are a HardwareError."""
+    """Immutable keys of units by name; two of one name, number or key are a HardwareError."""
 
     def __init__(self, units: Iterable[UnitKey] = ()) -> None:
         super().__init__()
@@ -92,7 +92,7 @@ class Keys(dict[str, UnitKey]):
         return keys
 
     def without(self, names: Sequence[str]) -> Self:
-        """Return keys without those of some names; a name there is not is a HardwareError."""
+        """Return keys without those of some names; an unknown name is a HardwareError."""
         absent = [name for name in names if name not in self]
         if absent:
             raise HardwareError(

@@ -17,7 +17,7 @@ _INNER = 7
 REACH_M = 0.6
 """Predicted return up to which a unit must see it [m]: in strong light the sensor sees 0.7 m."""
 MARGIN_M = 0.1
-"""By how much a reading may be farther than predicted [m]: ranging error, placement, and capsules for surfaces."""
+"""Largest excess of a reading over the prediction [m]: ranging error, placement, and capsules for surfaces."""
 TESTS = 100
 """Readings from which a verdict is given: four seconds' worth of the monitor's 25 a second."""
 SHARE = 0.8
@@ -39,7 +39,7 @@ class ModelCheck:
         self._certain_return(model.description.q_ready, np.ones(count, np.bool_))
 
     def take(self, q: FloatArray, readings: RangeReadings) -> None:
-        """Compare the readings that are new with what the posture q (n,) [rad] predicts.
+        """Compare new readings with the prediction for a posture q (n,) [rad].
 
         Readings and posture must be of the same instant to within some 50 ms; standing or slow arms are best. It takes
         0.2 ms for seven units: call it up to 25 times a second, outside the control loop.
@@ -76,7 +76,7 @@ class ModelCheck:
         return far
 
     def findings(self) -> tuple[Finding, ...]:
-        """Return what disagrees by now, in the order of the skin."""
+        """Return the units that disagree by now, in the order of the skin."""
         wrong = []
         for unit, tests in zip(self._skin.ids, self._tests, strict=True):
             missed = [(reading, predicted) for reading, predicted in tests if reading > predicted + MARGIN_M]

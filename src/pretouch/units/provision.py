@@ -1,4 +1,4 @@
-"""A unit's configuration file, with its key and where it sends, and putting it on the unit over USB.
+"""Configuration file of a unit, with its key and receiver, and its transfer to the unit over USB.
 
 MicroPython's own program `mpremote` copies it. No message and no exception here holds a key or a password.
 """
@@ -80,7 +80,7 @@ def configuration(key: UnitKey, network: Network, password: str) -> str:
 
 
 def copy_to_unit(device: str, text: str, timeout: float = COPY_S) -> None:
-    """Put a configuration on the unit at a serial device, and have it begin anew; what fails is a HardwareError."""
+    """Write a configuration to the unit at a serial device and restart it; a failure is a HardwareError."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "config.json"
         atomic_write(file, text, private=True)

@@ -1,4 +1,4 @@
-"""All sensor units of a skin at one UDP socket (docs/reference/wire.md): who may speak, what was measured, and when."""
+"""Receiver of all sensor units of a skin at one UDP socket (docs/reference/wire.md), with their sessions and clocks."""
 
 import errno
 import secrets

@@ -19,8 +19,8 @@ on the usual arm with the usual skin."""
 ABLATED_FREE, ABLATED_CONTACTS = "free: ablations", "contacts: ablations"
 """Of those, what ablations were given."""
 HARD, HARD_CONTACTS, UNTOLD = "hard: all", "hard, touched: all", "untold-load"
-"""Scenarios of the goals on arms with the flaws of real ones, and the motion that is no part of it: its loads may give an
-alarm each."""
+"""Scenarios of the goals on arms with the flaws of real ones, and the motion that is no part of it: its loads may give
+an alarm each."""
 Groups = dict[str, Row]
 """Values that all rows of a group have, by the group's name."""
 _USUAL = {"arm": "nominal", "sensing": "nominal", "goal": True}

@@ -19,13 +19,13 @@ class Simulated(ArmOptions):
     brings_units: ClassVar[bool] = True
 
     def check(self, setup: ArmSetup) -> None:
-        """Refuse a seed that is none."""
+        """Refuse a negative seed."""
         if self.seed < 0:
             raise ParameterError(f"--seed is {self.seed}: give 0 or more.")
 
     @contextmanager
     def open(self, setup: ArmSetup) -> Iterator[OpenedArm]:
-        """Let the arm live in a thread, and its units send to a receiver of this machine."""
+        """Run the arm in a thread, with units that send to a receiver on this machine."""
         from pretouch.arms.simulated.arm import ThreadedArm
         from pretouch.robot.model import RobotModel
         from pretouch.sensing.skin import Skin

@@ -1,4 +1,4 @@
-"""A simulated arm in real time, whose units tell a receiver what they measure as real ones do."""
+"""A simulated arm in real time, whose units send to a receiver as real ones do."""
 
 import threading
 import time
@@ -19,15 +19,15 @@ from pretouch.units.fleet import Fleet
 _SETTLE_S = 0.2
 """Time the arm stands before its time begins [s]: the observer's transient is over."""
 _SLICE_S = 0.002
-"""The simulation moves on by so much at once [s]: how late a datagram may leave."""
+"""Step of the simulation in real time [s]: the largest delay of a datagram."""
 _LATE_S = 0.1
 """Delay up to which a late machine catches up [s]; with more the simulation skips the lost time."""
 _PERIOD_S = 0.002
 """Time in which a command reaches an arm that moves on by itself, and between two of its states [s]."""
 _STUCK_S = 1.0
-"""A simulation that has not moved on for so long [s] is not a slow one."""
+"""Time without progress [s] after which the simulation is stuck, not slow."""
 _LAG_S = 0.03
-"""How much older than now a state is for a controller [s]: a machine that is late for a moment makes up for it."""
+"""Age of the state that a controller reads [s]: a machine that is late for a moment makes up for it."""
 _START_S = 120.0
 """Longest time it may take to begin [s]: everything may have to be compiled first."""
 _PUSH_N, _PUSH_AFTER_S, _PUSH_S = 14.0, 0.5, 1.5
@@ -43,7 +43,7 @@ class SimulatedArm:
     def __init__(
         self, model: RobotModel, q: FloatArray, skin: Skin, fleet: Fleet, scene: SceneSpec, period: float
     ) -> None:
-        """Let an arm stand at q (n,) [rad] in a scene, with the units of a skin; the control period is in s."""
+        """Place an arm at q (n,) [rad] in a scene, with the units of a skin; the control period is in s."""
         self.fleet, self._slices = fleet, max(1, round(period / _SLICE_S))
         self._slice = period / self._slices
         self._start = self._next = 0.0
@@ -56,7 +56,7 @@ class SimulatedArm:
         fleet.mount(self.plant, skin, self._since)
 
     def begin(self) -> None:
-        """Let the time of arm and units begin."""
+        """Start the time of arm and units."""
         self.plant.advance(_SETTLE_S)
         self._start, self._plant_start = time.monotonic(), self.plant.time
         self._next = self._start
@@ -94,7 +94,7 @@ class SimulatedArm:
         return self._start + self._since(simulated)
 
     def _since(self, simulated: float) -> float:
-        """Real time since the start [s]; what was before it counts as being at the start.
+        """Real time since the start [s]; earlier instants count as the start.
 
         It is when the simulation was due to be there, not when a late machine was, so that time flows evenly.
         """
@@ -116,7 +116,7 @@ class ThreadedArm:
     """The port `Arm`. A context manager, for its thread."""
 
     def __init__(self, model: RobotModel, q: FloatArray, skin: Skin, fleet: Fleet, scene: SceneSpec) -> None:
-        """Let an arm stand at q (n,) [rad] in a scene, as `SimulatedArm`. Nobody else may use the model in a thread."""
+        """Place an arm at q (n,) [rad] in a scene, as `SimulatedArm`. No other thread may use the model."""
         self.name = f"simulated {model.description.name}"
         self._arm = SimulatedArm(model, q, skin, fleet, scene, _PERIOD_S)
         self._still = np.zeros(model.n)
@@ -166,15 +166,15 @@ class ThreadedArm:
         self._set_point = np.array(qd, dtype=np.float64)
 
     def unfit(self) -> tuple[str, ...]:
-        """Nothing is ever against it."""
+        """Return no reason: a simulated arm is always fit to move."""
         return ()
 
     def begin(self) -> None:
-        """Take commands from here on."""
+        """Accept commands from now on."""
         self._set_point, self._begun = self._still, True
 
     def end(self) -> None:
-        """Take no more."""
+        """Accept no more commands."""
         self._set_point, self._begun = self._still, False
 
     def report(self) -> str:

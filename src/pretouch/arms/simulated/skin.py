@@ -1,4 +1,4 @@
-"""Simulated units in real time: an arm moves on its path, a hand comes and goes, and the units tell a receiver of it.
+"""Simulated units in real time: an arm moves on its path, a hand comes and goes, and the units send to a receiver.
 
 Where the receiver is does not matter to them: in another program, or on another machine. The arm's own controller has
 its readings within the process, so that the arm moves whatever becomes of the datagrams.
@@ -36,7 +36,7 @@ class VisitingHand:
         self._link = link
 
     def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
-        """Be where this time of the visit wants it, without any force to speak of."""
+        """Return the hand's target at this time of the visit, with almost no force."""
         here = 5.0 <= time % 15.0 < 10.0
         before = plant.link_position[self._link] + np.array([0.3, 0.0, 0.0])
         return HandGoal(before if here else np.array(self.away), 20.0)
