@@ -1,4 +1,4 @@
-"""All commands: the product's own, those of the distributions beside it, and those that other distributions add.
+"""Table of all commands: the product's, those of its other distributions, and those of entry points.
 
 A command is a dataclass whose docstrings are the help and whose `run()` does it. `run()` returns the exit code; with
 None it is 0, or that of the signal which ended the command. Where its options depend on what its first word names,
@@ -60,10 +60,10 @@ OWN = tuple(name for name, place in _PLACES.items() if ":" in place)
 
 
 class Command(Protocol):
-    """Options of a command, as they stand on the command line."""
+    """Options of a command."""
 
     def run(self) -> int | None:
-        """Do it; return the exit code, or None."""
+        """Run the command; return the exit code, or None."""
 
 
 def commands_of(distribution: str) -> tuple[str, ...]:

@@ -59,7 +59,7 @@ class Detect(Choice):
     json: JsonFile = None
 
     def run(self) -> None:
-        """Run the detectors, show what they find, and write a figure or page and the numbers where asked."""
+        """Run the detectors, show their results, and write figure, page and numbers if requested."""
         if not all(np.isfinite(gain) and gain > 0.0 for gain in self.gains):
             raise ParameterError(
                 f"--gains is {','.join(map('{:g}'.format, self.gains))}: give torques by current [Nm/A] above 0."
@@ -120,11 +120,11 @@ class _Results:
     results: list[DetectorResult]
     courses: list[Course]
     notes: list[str]
-    """Sentences on what was read, and on what detectors made of it."""
+    """Sentences on the data and on the results."""
 
     @property
     def tables(self) -> list[TextTable]:
-        """Contacts, how the detectors fared, and free motion."""
+        """Tables of contacts, of the detectors, and of free motion."""
         return [
             _contacts(self.results),
             _detection(self.results),
@@ -132,7 +132,7 @@ class _Results:
         ]
 
     def numbers(self) -> dict[str, Any]:
-        """Return what goes into the JSON file."""
+        """Return the contents of the JSON file."""
         r = self.recording
         return {
             "recording": str(r.place),
@@ -176,7 +176,7 @@ class _Results:
             out.write_bytes(image.getvalue())
 
     def _figures(self) -> list[tuple["Figure", str]]:
-        """Draw figures, each with what it shows."""
+        """Draw figures, each with its caption."""
         from pretouch.imported_data.figures import decisions_figure, torque_figure  # needs the extra
         from pretouch.recording.compare import Decisions
 

@@ -68,7 +68,7 @@ def sentences(notes: Iterable[Note]) -> list[str]:
 
 
 def read_from(r: ForceRecording | TorqueRecording) -> str:
-    """Say what was read, and what was assumed of it."""
+    """Return a sentence on the data and the assumptions on it."""
     if isinstance(r, ForceRecording):
         sign, other = ("by", "on-robot") if r.by_robot else ("on", "by-robot")
         frame, another = ("end-effector's", "base") if r.in_ee else ("base", "ee")
@@ -89,7 +89,7 @@ def read_from(r: ForceRecording | TorqueRecording) -> str:
 
 
 def guidance(results: Sequence[DetectorResult]) -> list[str]:
-    """Say which contacts profiles share, and what contacts mean for an arm that nobody touched."""
+    """Return sentences on shared contacts, and on the false alarms of an arm that nobody touched."""
     first, *others = results
     texts = []
     for r in others:
@@ -131,5 +131,5 @@ def _motion_guidance(r: DetectorResult) -> str:
 
 
 def shown(value: float, digits: int) -> str:
-    """Write a number; inf and what is not known otherwise."""
+    """Format a number, with words for infinite and unknown ones."""
     return f"{value:.{digits}f}" if np.isfinite(value) else "inf" if value > 0 else "–"

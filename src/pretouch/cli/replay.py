@@ -49,7 +49,7 @@ class Replay:
     """Port to serve the page at."""
 
     def run(self) -> int:
-        """Tell of the recording, and check, compare or show it; where the page is, is said before anything is read.
+        """Summarise the recording, and check, compare or show it; the page's address is printed before the reading.
 
         The exit code is 1 if a step differs when it is recomputed.
         """
@@ -105,14 +105,14 @@ class Replay:
 
 @contextmanager
 def _progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
-    """Show a bar on standard error, and give the function that moves it on."""
+    """Show a progress bar on standard error, and yield the function that advances it."""
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(what, total=total)
         yield lambda done: bar.update(task, completed=done)
 
 
 def _described(recorded: Recorded) -> dict[str, object]:
-    """Return what a recording is of, for JSON."""
+    """Return the facts of a recording, for JSON."""
     stamps, run = recorded.stamps(), recorded.runs[0]
     return {
         "recording": str(recorded.place),
@@ -126,7 +126,7 @@ def _described(recorded: Recorded) -> dict[str, object]:
 
 
 def _what_ran(recorded: Recorded) -> str:
-    """Say in a line what ran, and for how long."""
+    """Return a line on the run and its duration."""
     stamps, run = recorded.stamps(), recorded.runs[0]
     profiles = ", then ".join(run.profile.name for run in recorded.runs)
     command = run.about.get("command")
@@ -138,7 +138,7 @@ def _what_ran(recorded: Recorded) -> str:
 
 
 def _events(recorded: Recorded, advance: Callable[[int], None]) -> dict[str, Any]:
-    """Count contacts and holds after the start, where each arm is held; `advance` gets how many steps were read."""
+    """Count contacts and holds after the initial hold of each arm; `advance` receives the number of read steps."""
     modes, contacts = list[Mode](), 0
     for i, cycle in enumerate(recorded):
         contacts += cycle.step.contact is not None

@@ -1,4 +1,4 @@
-"""`pretouch report`: one page of what recordings tell."""
+"""`pretouch report`: one page on recordings."""
 
 import os
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ class WriteReport:
     out: Path = Path("report.html")
     """File to write."""
     replace: bool = False
-    """Overwrite a file that is there."""
+    """Overwrite an existing file."""
 
     def run(self) -> None:
         """Write the page."""

@@ -1,4 +1,4 @@
-"""An arm imported or checked on the command line: the report of what was read, fitted and assumed."""
+"""`pretouch robot import` and `check`: the report on an arm's file, capsules and assumptions."""
 
 import re
 from dataclasses import dataclass, replace
@@ -51,7 +51,7 @@ class ImportArm(ImportOptions):
     json: JsonFile = None
 
     def run(self) -> None:
-        """Import an arm, print what came of it, and write its folder."""
+        """Import an arm, print a report, and write its folder."""
         file, options, folder = Path(self.file), self, self.out
         if named := described(self.file):
             file, package = named
@@ -65,7 +65,7 @@ class ImportArm(ImportOptions):
 
 
 def _imported(file: Path, options: ImportOptions, folder: Path) -> dict[str, Any]:
-    """Import an arm, write its folder, and print what came of it; return the numbers."""
+    """Import an arm, write its folder, and print a report; return the numbers."""
     imported = import_robot(file, options)
     model, ready = imported.model, imported.ready
     write_folder(imported, folder)
@@ -114,7 +114,7 @@ class CheckArm:
     json: JsonFile = None
 
     def run(self) -> None:
-        """Load an arm and its skin, and print what is known of them; what is wrong is an error of this package."""
+        """Load an arm and its skin, and print their facts; a fault is an error of this package."""
         with numbers_to(self.json) as write:
             write(_checked(self))
 
@@ -145,7 +145,7 @@ def _checked(command: CheckArm) -> dict[str, Any]:
 
 
 def arm_numbers(model: RobotModel, ready: Ready) -> dict[str, Any]:
-    """Return what is known of an arm, and its ready posture, as JSON is to have them."""
+    """Return the facts of an arm and its ready posture, for JSON."""
     limits = {"joints": model.joints, "q_min": model.q_min, "q_max": model.q_max}
     return {"arm": model.description, "ready": ready, "never_apart": never_apart(model)} | limits
 
@@ -166,7 +166,7 @@ def joint_table(model: RobotModel, ready: Ready, note: str) -> TextTable:
 
 
 def ready_said(ready: Ready) -> str:
-    """Say what a posture is good for."""
+    """Return a sentence on the quality of a posture."""
     return (
         f"Ready posture: manipulability {ready.manipulability:.3g}, smallest singular value {ready.singular_value:.3g},"
         f" {1000 * ready.clear:.0f} mm clear of itself."

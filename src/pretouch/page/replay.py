@@ -72,13 +72,13 @@ class Player:
         return max(0, bisect_right(self._times, time + 1e-9) - 1)
 
     def advance(self, elapsed: float) -> None:
-        """Let real time [s] pass; it stops at the end."""
+        """Advance by real time [s]; it stops at the end."""
         if self.playing:
             self.seek(self.time + self.speed * elapsed)
             self.playing = self.time < self.duration
 
     def play(self) -> None:
-        """Play on, or pause; from the end, from the start."""
+        """Continue or pause; at the end, start again."""
         self.playing = not self.playing
         if self.playing and self.time >= self.duration:
             self.time = 0.0
@@ -134,7 +134,7 @@ class Timeline:
 
 
 def _whats(step: Callable[[int], ControlStep], count: int) -> Iterator[str]:
-    """Yield what happens in each step, or ''."""
+    """Yield the event of each step, or ''."""
     mode, answered = None, True
     for now in map(step, range(count)):
         if now.contact is not None:
@@ -194,7 +194,7 @@ class ReplayPage:
         self._status.notice = none if event is None else f"{event.what} at {self.player.time:.2f} s."
 
     def hold(self, error: Exception, say: Callable[[str], None]) -> None:
-        """Play no further after an error that nobody foresaw, and say it once."""
+        """Pause after an unexpected error, and show it once."""
         self.player.playing = False
         self._status.fail(error, say)
 
@@ -250,7 +250,7 @@ class ReplayPage:
         self._status.draw(step.mode, explanation, " · ".join(filter(None, (rates, finds(step)))), "", now)
 
     def run_name(self, run: int) -> str:
-        """Name the controller of a run; of several, one may differ from another by nothing but its path."""
+        """Return the name of a run's controller, with its path where several runs share a profile."""
         runs = self._recorded.runs
         part = f", part {run + 1} of {len(runs)}, path of {runs[run].path.length:.2f} m" if len(runs) > 1 else ""
         return f"profile {runs[run].profile.name}{part}"

@@ -108,7 +108,7 @@ class Mouse:
     """The script of a hand that follows a pointer."""
 
     def __init__(self, target: FloatArray, scene: SceneSpec, hand: HandSpec, size: float = 1.0) -> None:
-        """Begin with the pointer at a place (3,) [m]. Round an arm of `size` times a Panda's there is as much space."""
+        """Begin with the pointer at a place (3,) [m]. The workspace scales with the arm's `size`, 1 for a Panda."""
         space = max(1.0, size)
         self.lowest, self.highest = space * _LOWEST, space * _HIGHEST
         """Corners (3,) of the space the hand is led through [m], base frame."""
@@ -118,7 +118,7 @@ class Mouse:
         self.move(target)
 
     def move(self, target: FloatArray) -> None:
-        """Point to a place (3,) [m], or the nearest to it in the workspace; what is no place is a ParameterError."""
+        """Point to a place (3,) [m], or the nearest to it in the workspace; an invalid place is a ParameterError."""
         self.target = np.clip(_place("The hand's target", target), self.lowest, self.highest)
 
     def point(self, eye: FloatArray, place: FloatArray, model: RobotModel, q: FloatArray) -> None:
@@ -158,12 +158,12 @@ def at_depth(model: RobotModel, q: FloatArray, eye: FloatArray, place: FloatArra
 
 
 class Room:
-    """All that is simulated, at rest where the path begins."""
+    """Simulated room, at rest at the start of the path."""
 
     def __init__(
         self, settings: LiveSettings, path: Path, model: RobotModel, skin: Skin, real: RealUnits | None = None
     ) -> None:
-        """Build it; a control period that is no whole number of physics steps is a ParameterError.
+        """Build the room; a control period that is no whole number of physics steps is a ParameterError.
 
         With `real` units the arm carries those in place of simulated ones.
         """

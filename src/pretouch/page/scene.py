@@ -46,7 +46,7 @@ class Scene:
         else:
             _draw_room(server, world.floor_height)
         surfaces, self.notice = vendor_surfaces(world.model)
-        """Sentence on what the arm is drawn by, where it is not the vendor's surfaces."""
+        """Sentence on the surfaces of the arm, where they are not the vendor's."""
         self._arm = ArmBody(scene, world.model, world.skin, surfaces or capsule_surfaces(world.model), root)
         self.units = Units(scene, world.skin, world.model.links, root)
         self.trail = Trail(scene, root)
@@ -120,7 +120,7 @@ class Scene:
             self._boxes.append(node)
 
     def draw(self, frame: Frame, now: float) -> DrivenMotion | None:
-        """Draw one instant, and return what a commander asked in it."""
+        """Draw one instant, and return the motion that a commander requested in it."""
         step, world = frame.step, self._world
         kin = world.model.kinematics(step.q)
         expected = expectation(step.obstacles, len(world.skin), MovingThresholds.of_kind(world.profile.detect))
@@ -188,7 +188,7 @@ def _dashes(world: World, count: int = 80) -> FloatArray:
 
 
 def _draw_room(server: ViserServer, floor_height: float) -> None:
-    """Draw floor and sky, and have visitors look from where they see most."""
+    """Draw floor and sky, and set the visitors' camera."""
     server.initial_camera.position, server.initial_camera.look_at = CAMERA_FROM, CAMERA_AT
     server.initial_camera.fov = CAMERA_FOV
     scene = server.scene

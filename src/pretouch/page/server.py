@@ -1,4 +1,4 @@
-"""The web server of a page: on this machine alone unless asked, on the port that was asked for, and quiet."""
+"""The web server of a page: for this machine alone by default, at a fixed port, and quiet."""
 
 import errno
 import ipaddress
@@ -44,7 +44,7 @@ def url_of(options: ServeOptions) -> str:
 
 
 def announce(options: ServeOptions, what: str, exposed: str, say: Callable[[str], None]) -> None:
-    """Say where a page is, and beyond this machine what is `exposed` there; open it if that is asked for."""
+    """Print a page's address, and what is `exposed` beyond this machine; open it if requested."""
     say(f"{what} is at {url_of(options)} (Ctrl-C ends it).")
     if not _stays_here(options.host):
         say(f"Mind: other machines reach this page, unencrypted. Whoever has the address can {exposed}.")
@@ -66,7 +66,7 @@ def _stays_here(host: str) -> bool:
 
 @contextmanager
 def served(options: ServeOptions, title: str) -> Iterator["ViserServer"]:
-    """Serve an empty page while the context lasts; a ViewerError says what is missing or in the way."""
+    """Serve an empty page while the context lasts; a ViewerError names what is missing or in the way."""
     LIVE.need("The page")
     check_port(options)
     from pretouch.page.door import GuardedServer
@@ -129,7 +129,7 @@ def _busy(options: ServeOptions) -> ViewerError:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep the server from printing its own banner, and what it thinks of visitors who do not speak its protocol."""
+    """Keep the server from printing its banner, and errors of visitors with another protocol."""
     import rich
 
     console, log = rich.get_console(), logging.getLogger("websockets")

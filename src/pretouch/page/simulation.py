@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 def nobody(now: float) -> Desired | None:
-    """Ask for nothing: the arm follows its path."""
+    """Request no motion: the arm follows its path."""
     return None
 
 
@@ -94,7 +94,7 @@ class LiveSimulation:
         self._resume, self._remainder, self.opening = False, 0.0, None
         self._pushes = Pushes(room.plant, (), 0.0)
         self._push: PushOutcome | None = None
-        """The newest push, until what it led to is known."""
+        """The newest push, until its outcome is known."""
         self._update_world()
         self.single_step()
 
@@ -141,7 +141,7 @@ class LiveSimulation:
         return self.room.mouse.target
 
     def move_hand(self, target: FloatArray) -> None:
-        """Draw the hand to a place (3,) [m], base frame, or the nearest to it in the workspace; ends an opening."""
+        """Move the hand's target to a place (3,) [m], base frame, or the nearest in the workspace; ends an opening."""
         self.opening = None
         self.room.mouse.move(target)
 
@@ -151,7 +151,7 @@ class LiveSimulation:
         self.room.mouse.point(eye, place, self.model, self.frame.step.q)
 
     def set_profile(self, profile: Profile) -> None:
-        """Go on with other parameters; another control period is a ParameterError."""
+        """Continue with other parameters; another control period is a ParameterError."""
         period = self.controller.limits.period
         if profile.task.control_period_s != period:
             raise ParameterError(
@@ -171,12 +171,12 @@ class LiveSimulation:
         self.room.set_stiffness(stiffness)
 
     def set_faults(self, faults: Faults) -> None:
-        """Have the units err as faults say; an unknown id, and any fault of real units, is a ParameterError."""
+        """Apply faults to the units; an unknown id, and any fault of real units, is a ParameterError."""
         self.room.set_faults(faults)
         self.settings = replace(self.settings, faults=faults)
 
     def push(self, force: FloatArray, duration: float) -> None:
-        """Push the robot's hand with a force (3,) [N], base frame, for a while [s]; the notice tells what it led to."""
+        """Push the robot's hand with a force (3,) [N], base frame, for a time [s]; the notice tells the outcome."""
         x, y, z = np.asarray(force, dtype=np.float64).tolist()
         self._pushes.add(TcpPush(self.time, (x, y, z), duration))
         self._push = PushOutcome(force, self.time, duration)
@@ -192,7 +192,7 @@ class LiveSimulation:
         self.opening = Opening(self.model, self._true_skin, self.controller.path, scale, self.room.mouse.target)
 
     def reset(self, **changes: Any) -> None:
-        """Begin again at time 0 with all as it is set by now, but for changes of `LiveSettings`; ends a recording."""
+        """Restart at time 0 with the present settings, but for changes of `LiveSettings`; ends a recording."""
         self._begin(replace(self.settings, **changes))
 
     # recordings
@@ -206,7 +206,7 @@ class LiveSimulation:
         self.recording = begun
 
     def stop_recording(self) -> str:
-        """End the recording and say what is in it; '' if there was none."""
+        """End the recording and return a sentence on it; '' if there was none."""
         recording, self.recording = self.recording, None
         return recording.close() if recording else ""
 

@@ -1,4 +1,4 @@
-"""The way the end-effector went, coloured as in the paper's Fig. 4, of bounded length and bounded traffic."""
+"""Trail of the end-effector, coloured as in the paper's Fig. 4, of bounded length and bounded traffic."""
 
 from enum import Enum
 
@@ -31,7 +31,7 @@ class Activity(Enum):
 
 
 def activity(step: ControlStep) -> Activity:
-    """Tell how the arm goes in a step."""
+    """Return the arm's activity in a step."""
     if step.mode is not Mode.TRACK:
         return Activity.REACTING if step.mode is Mode.REACT else Activity.HOLDING
     if np.linalg.norm(step.ee_position - step.path_position) < OFF_PATH_M:
@@ -40,7 +40,7 @@ def activity(step: ControlStep) -> Activity:
 
 
 class Trail:
-    """Segments of the way the end-effector went, the newest `BLOCK` * `BLOCKS` of them.
+    """The newest `BLOCK` * `BLOCKS` segments of the end-effector's trail.
 
     Blocks are used over again: a page keeps what was ever added to it, and may be open for days.
     """
@@ -71,7 +71,7 @@ class Trail:
             block.visible = visible
 
     def add(self, step: ControlStep) -> None:
-        """Go on to where the arm is in a step."""
+        """Append the arm's position in a step."""
         here = step.ee_position
         if self._last is None:
             self._last = here
@@ -86,13 +86,13 @@ class Trail:
         self._last = here
 
     def draw(self, now: float) -> None:
-        """Send what has come, at a time [s]; not more often than ten times a second."""
+        """Send new segments, at a time [s]; at most ten times a second."""
         if self._points and now - self._sent >= _PERIOD_S:
             self._sent = now
             self._send()
 
     def clear(self) -> None:
-        """Forget the way so far."""
+        """Clear the trail."""
         for block in self._blocks:
             block.visible = False
         self._points, self._colours, self._last, self._full = [], [], None, 0

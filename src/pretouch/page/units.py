@@ -1,4 +1,4 @@
-"""The sensor units of the page: where they sit, what their cones cover, and what they see."""
+"""Sensor units on the page: their places, cones and sensed points."""
 
 from collections.abc import Sequence
 from typing import Any

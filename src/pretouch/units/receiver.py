@@ -20,7 +20,7 @@ from pretouch.units.unit import NOTHING, Address, Received, UnitEndpoint, UnitTr
 from pretouch.units.wire import HELLO_SIZE, MAGIC, SAMPLE_LEAST, VERSION, Kind, sample_size
 
 REASONS = ("size", "format", "unit", "tag", "replayed", "no session", "too many hellos", "old hello")
-"""Why datagrams are thrown away: no size, or no magic, version and kind, of ours; a unit this skin lacks; a wrong tag;
+"""Reasons to reject a datagram: a size, or a magic, version and kind, not ours; a unit this skin lacks; a wrong tag;
 a sequence number seen already or long past; a sample of a unit without session; more hellos than are answered; a hello
 of the very session that is live."""
 _SO_RCVBUFFORCE = 33
@@ -136,11 +136,11 @@ class SkinReceiver:
         self.close()
 
     def close(self) -> None:
-        """Listen no more; what was received stays."""
+        """Stop listening; received readings stay."""
         self._socket.close()
 
     def receive(self, timeout: float = 0.0) -> int:
-        """Take in all that has arrived, and send the beacons that are due; return how many samples were accepted.
+        """Receive all datagrams, and send the beacons that are due; return the number of accepted samples.
 
         Under a flood, no more than `DRAIN_MOST` datagrams are taken in.
 
@@ -176,7 +176,7 @@ class SkinReceiver:
         return arrivals
 
     def _drain(self) -> tuple[int, bool]:
-        """Take in what has arrived; return how many samples were accepted, and whether anything came at all."""
+        """Receive waiting datagrams; return the number of accepted samples, and whether anything came at all."""
         take, buffer, view, clock = self._socket.recvfrom_into, self._buffer, self._view, self._clock
         accepted = 0
         for k in range(DRAIN_MOST):
@@ -200,7 +200,7 @@ class SkinReceiver:
         return accepted, True
 
     def _take_in(self, datagram: memoryview, size: int, address: Address, now: float) -> str | None:
-        """Take in one datagram: return None for a sample, "" for a hello, or why it is thrown away."""
+        """Handle one datagram: return None for a sample, "" for a hello, or the reason to reject it."""
         if size < _LEAST:
             return "size"
         head, number, _, sequence = _HEAD.unpack_from(datagram)
@@ -245,7 +245,7 @@ class SkinReceiver:
 
 
 def demand_port(host: str, port: int) -> None:
-    """Raise a HardwareError for what is no port."""
+    """Raise a HardwareError for an invalid port."""
     if type(port) is not int or not 0 <= port <= 0xFFFF:
         raise HardwareError(
             f"The port {port!r} for {host} is not valid: choose one from 1 to 65535, or 0 for any free port."
@@ -253,7 +253,7 @@ def demand_port(host: str, port: int) -> None:
 
 
 def bind(host: str, port: int) -> socket.socket:
-    """Open a socket that never blocks, at this address; one that cannot be had is a HardwareError."""
+    """Open a socket that never blocks, at this address; a failure is a HardwareError."""
     demand_port(host, port)
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
@@ -277,7 +277,7 @@ def bind(host: str, port: int) -> socket.socket:
 
 
 def _widen(bound: socket.socket) -> None:
-    """Ask for a long queue: past the system's limit if that is allowed."""
+    """Request a long queue: beyond the system's limit if that is allowed."""
     try:
         bound.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, BUFFER_BYTES)
     except PermissionError:

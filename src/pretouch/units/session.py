@@ -1,4 +1,4 @@
-"""The receiver's side of the session with one unit: what it believes, and what it answers. No socket, no clock.
+"""The receiver's side of the session with one unit: samples it accepts, and its answers. No socket, no clock.
 
 A unit out of session sends hellos with a challenge; each challenge is answered by a beacon with a fresh nonce, which
 makes a pending session. A sample that verifies under a pending session shows that the unit took it: it is the live one
@@ -56,7 +56,7 @@ class ReplayWindow:
         return behind < 0 or (behind < WIDTH and not self._accepted >> behind & 1)
 
     def take(self, sequence: int) -> int:
-        """Mark a number that is admitted; return how many were given up as lost by it."""
+        """Mark an admitted number; return how many older numbers it makes lost."""
         ahead = sequence - self.newest
         if ahead <= 0:
             self._accepted |= 1 << -ahead
@@ -118,7 +118,7 @@ class UnitLink:
     """State of the receiver for the sessions of one unit."""
 
     def __init__(self, key: bytes, draw: Callable[[int], bytes]) -> None:
-        """Know of no session; `draw` gives so many random bytes."""
+        """Begin without a session; `draw` returns random bytes."""
         self._key, self._draw = Mac(key), draw
         self.live: Session | None = None
         self._pending: dict[bytes, Session] = {}
@@ -165,7 +165,7 @@ class UnitLink:
         return reason
 
     def _go_live(self, session: Session) -> int:
-        """Let a session be the live one; return how many of the last one's samples never came.
+        """Make a session the live one; return how many of the last one's samples never came.
 
         The unit that took it no longer heeds what was offered before: a sample held back until now must not bring it
         back.
@@ -185,7 +185,7 @@ class UnitLink:
         return self.live.beacon(self._key, now)
 
     def expire(self, now: float) -> None:
-        """Forget offers that were not taken."""
+        """Drop offers that were not accepted."""
         for challenge, session in list(self._pending.items()):
             if now - session.offered > PENDING_EXPIRY_S:
                 del self._pending[challenge]

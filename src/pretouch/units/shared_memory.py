@@ -1,4 +1,4 @@
-"""The newest value, or the last so many, from one process to others, in shared memory; nobody ever waits for anybody.
+"""The newest value, or the last values, from one process to others in shared memory, without waiting.
 
 The writer fills one of a few slots in turn and then tells its number. A slot holds the number, the size and a checksum
 over both and the value, so that a reader takes a value whole or not at all, however writer and reader are interrupted,
@@ -51,7 +51,7 @@ _TRIES = 16
 
 
 class _ValueSlots:
-    """Values by their numbers, as far as there is room. One writer; pickled for a process that is being spawned."""
+    """Values by their numbers, in a fixed number of slots. One writer; pickled for a spawned process."""
 
     def __init__(self, slots: int, most: int) -> None:
         self._slots, self._most = slots, most
@@ -116,13 +116,13 @@ class Mailbox(_ValueSlots, Generic[Value]):
 
 
 class Ring(_ValueSlots):
-    """The last so many values: a reader gets each that was written since it last looked, as far as there is room.
+    """The last values: a reader gets each value since its last look, as far as the slots hold them.
 
     Each reader has a `Ring` of its own.
     """
 
     def __init__(self, slots: int, most: int) -> None:
-        """Make an empty one for so many values of at most so many bytes each."""
+        """Make an empty ring for a number of values and their largest size in bytes."""
         super().__init__(slots, most)
         self._read = 0
 

@@ -1,4 +1,4 @@
-"""A simulated sensor unit's side of the wire: what the firmware does with its sensors, its clock and its session."""
+"""A simulated sensor unit on the wire: the firmware's use of sensors, clock and session."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator
@@ -101,7 +101,7 @@ class SimulatedUnit:
         self._forget()
 
     def _forget(self) -> None:
-        """Know nothing, as after a reset."""
+        """Clear the state, as after a reset."""
         self._measuring: deque[list[RangeSample]] = deque()
         self._range: list[RangeSample] = []
         self._range_new, self._stream = False, 0
@@ -127,7 +127,7 @@ class SimulatedUnit:
         return self._session is not None
 
     def reboot(self, now: float) -> None:
-        """Begin anew at a time [s]; its clock begins at 0."""
+        """Restart at a time [s]; its clock begins at 0."""
         self._began, self._up, self._reset = now, now + self._params.boot_s, Reset.WATCHDOG
         self._forget()
 
@@ -212,7 +212,7 @@ class SimulatedUnit:
         self._beacon, self._beacon_time = beacon.number, now
 
     def tick(self, now: float) -> list[bytes]:
-        """Do what is due at a time [s], and return the datagrams to send."""
+        """Run the unit at a time [s], and return the datagrams to send."""
         while self._next_reboot <= now:
             self.reboot(self._next_reboot)
             self._next_reboot = next(self._reboots, np.inf)

@@ -46,7 +46,7 @@ _RECORD = struct.Struct("<Hdddd")
 
 @dataclass(frozen=True)
 class Traffic:
-    """All that a receiver has counted."""
+    """Counts of a receiver."""
 
     units: tuple[UnitTraffic, ...]
     rejected: dict[str, int]
@@ -59,7 +59,7 @@ class SharedOutputs:
     """Shared memory for a receiver's results; a spawned process that takes it as an argument shares it."""
 
     def __init__(self, units: NetworkUnits, traffic: Traffic) -> None:
-        """Make them for units that have measured nothing, and of which so much is counted."""
+        """Make them for units without measurements, with counts."""
         nothing = np.tile(NOTHING, (units.rows, 1))
         self.table = Mailbox[FloatArray](nothing.nbytes + _PICKLED, nothing)
         """The newest table (K, 7), as `SkinReceiver.table` has it."""
@@ -67,7 +67,7 @@ class SharedOutputs:
         self._samples = Ring(SAMPLES_MOST, _RECORD.size + SAMPLE_MOST - TAG_SIZE)
 
     def put(self, receiver: SkinReceiver) -> None:
-        """Give what a receiver has: its table, and the samples that it accepted."""
+        """Write a receiver's table and its accepted samples."""
         self.table.put(receiver.table)
         for r in receiver.take_samples():
             self._samples.write(_RECORD.pack(r.unit, r.arrival, r.stamp, r.offset, r.bound) + r.sample.body())
@@ -182,7 +182,7 @@ def _serve(
     outputs: SharedOutputs,
     started: Connection,
 ) -> None:
-    """Receive until the parent is gone, or kills this process; send it the address, or a sentence on what is wrong."""
+    """Receive until the parent ends, or kills this process; send it the address, or a sentence on a failure."""
     leave_to_parent()
     network, keyed, host, port = listening
     try:

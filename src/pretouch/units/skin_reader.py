@@ -1,4 +1,4 @@
-"""A recording of sensor units, opened: what each unit measured, as arrays."""
+"""Reader of recordings of sensor units: each unit's measurements as arrays."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class RangeTrace:
 
 @dataclass(frozen=True, eq=False)
 class UnitTrace:
-    """All that one unit measured."""
+    """Measurements of one unit."""
 
     samples: list[Received]
     """Its datagrams, in the order in which they came; `unit` is the index of the unit in the recording."""
@@ -68,7 +68,7 @@ class SkinTrace:
 
 
 def read_skin(place: Path) -> SkinTrace:
-    """Read what `SkinRecording` wrote, finished or cut off. RecordingError for a file that holds nothing of it."""
+    """Read a file of `SkinRecording`, complete or cut off. RecordingError for any other file."""
     place, contents, way_out = Path(place), Contents(), "give a recording made by `pretouch skin monitor --record`"
     samples: dict[str, list[Received]] = {}
     states: list[Any] = []

@@ -1,4 +1,4 @@
-"""One unit as its receiver sees it: session, clock, newest reading, and what is counted of it."""
+"""One unit as its receiver sees it: session, clock, newest reading and counts."""
 
 import math
 from collections.abc import Callable
@@ -29,7 +29,7 @@ CLOCK_WINDOW_S = 10.0
 SILENT_AFTER_S = 0.3
 """Time without a sample after which a unit is called silent [s]; the controller judges by itself."""
 STUCK_AFTER_S = 1.0
-"""How long a unit may repeat a reading to the last digit before it counts as stuck [s]; noise alone changes it."""
+"""Time of equal readings, to the last digit, after which a unit counts as stuck [s]; noise alone changes them."""
 _GREETING_S = 1.0
 """Time without a hello after which a unit no longer asks for a session [s]; it would ask ten times in it."""
 NOTHING = (-math.inf, 0.0, float(RangeStatus.NONE), -math.inf, 0.0, math.nan, float(TouchStatus.NONE))
@@ -45,7 +45,7 @@ class UnitTraffic:
     number: int
     state: UnitState = "never heard"
     accepted: int = 0
-    """Samples believed."""
+    """Accepted samples."""
     lost: int = 0
     """Samples that never came: counted once 64 later ones were sent, or another session began."""
     replayed: int = 0
@@ -154,7 +154,7 @@ class UnitEndpoint:
     """Address, sessions and traffic of one unit. Times in seconds of the host's clock."""
 
     def __init__(self, index: int, unit: UnitKey, zones: int, draw: Callable[[int], bytes], rows: FloatArray) -> None:
-        """Know nothing yet of the unit with this index in the `NetworkUnits` of the skin.
+        """Begin without data of the unit with this index in the `NetworkUnits` of the skin.
 
         What it measures goes to `rows` (`zones` squared, 7), as `NOTHING` has it; a touch to the first of them.
         """
@@ -187,7 +187,7 @@ class UnitEndpoint:
         return answer
 
     def sample(self, datagram: memoryview, sequence: int, address: Address, now: float) -> Received | str:
-        """Return what a datagram that looks like a sample brought, or why it is not believed."""
+        """Return the result of a datagram that looks like a sample, or the reason to reject it."""
         verified = self._link.sample(datagram, sequence, now)
         traffic = self.traffic
         if isinstance(verified, str):
@@ -216,7 +216,7 @@ class UnitEndpoint:
         return Received(self._index, now, stamp, traffic.offset, traffic.bound, sample)
 
     def beacon_due(self, now: float) -> bool:
-        """Return whether a beacon is to be sent to `address`; do what else time asks for."""
+        """Return whether a beacon is due for `address`; expire what is too old."""
         traffic = self.traffic
         if (traffic.state == "live" and now - traffic.last_arrival > SILENT_AFTER_S) or (
             traffic.state == "greeting" and now - self._last_hello > _GREETING_S
@@ -230,7 +230,7 @@ class UnitEndpoint:
         return self._link.beacon(now)
 
     def _begin(self, session: Session) -> None:
-        """Another session is live."""
+        """Begin another session."""
         traffic = self.traffic
         traffic.sessions += 1
         if session.hello.uptime_us < self._newest_us:
@@ -241,7 +241,7 @@ class UnitEndpoint:
         self._clock.forget()
 
     def _tell_time(self, session: Session, sample: Sample, now: float) -> None:
-        """Renew offset and bound."""
+        """Update offset and bound."""
         clock, traffic = self._clock, self.traffic
         sent = None
         if sample.beacon != self._echoed and sample.beacon >= self._trusted_from:

@@ -1,4 +1,4 @@
-"""A skin watched: what comes from its receiver, judged a few times a second."""
+"""Watch of a skin: samples of its receiver, judged a few times a second."""
 
 import math
 import time
@@ -34,7 +34,7 @@ class WatchUpdate:
 
 
 class UnitWatch:
-    """Watches the units of a skin, for as long as `take` is called or `updates` are asked for."""
+    """Watches the units of a skin while `take` or `updates` are called."""
 
     def __init__(
         self,
@@ -62,7 +62,7 @@ class UnitWatch:
         self._look_due = self._compare_due = -math.inf
 
     def take(self) -> list[Received]:
-        """Take in what came if it is time to; return the samples. It may be called as often as one likes."""
+        """Collect the samples if it is time to; return them. It may be called at any rate."""
         self._compare()
         return self._look() if time.monotonic() >= self._look_due else []
 

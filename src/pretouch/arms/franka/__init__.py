@@ -34,7 +34,7 @@ class Franka(ArmOptions):
         return planned(description, LimiterParams())
 
     def check(self, setup: ArmSetup) -> None:
-        """Refuse other arms, and go on with the vendor's library only."""
+        """Refuse other arms, and a missing vendor's library."""
         from pretouch.arms.franka.connection import LIBRARIES, need_library
 
         if setup.name not in LIBRARIES:
@@ -69,7 +69,7 @@ class Franka(ArmOptions):
 
 
 def identity(kind: "Kind", address: str) -> "Identity":
-    """Return what a robot at an address is known by: another library asks for the guided pushes again."""
+    """Return the identity of a robot at an address: another library requires the guided pushes again."""
     from pretouch.arms.franka.connection import LIBRARIES
     from pretouch.session.memory import Identity
 
@@ -78,7 +78,7 @@ def identity(kind: "Kind", address: str) -> "Identity":
 
 
 def _recover(arm: "FrankaArm", yes: bool) -> None:
-    """Let an arm that has stopped by itself recover; a person is asked first, for it may move a little."""
+    """Let a stopped arm recover; a person is asked first, because it may move a little."""
     from pretouch.session.terminal import require_yes, say
 
     if arm.state().mode != "reflex":

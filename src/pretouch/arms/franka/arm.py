@@ -1,4 +1,4 @@
-"""A Franka arm in real time: the port `Arm`, over a process that speaks with the arm each millisecond."""
+"""A Franka arm in real time: the port `Arm`, through a process that talks to the arm each millisecond."""
 
 import os
 import time
@@ -29,7 +29,7 @@ _NAMES: dict[Kind, str] = {"panda": "Panda", "fr3": "FR3"}
 
 
 class FrankaArm:
-    """An arm that states flow from as soon as it is connected; a context manager.
+    """A connected arm that reports its states; a context manager.
 
     `begin`, commands, `end`: in between the arm follows the newest command, which must not be older than
     `FrankaParams.stale_after_s`. However the program ends, the arm comes to rest (`process`). For one thread.
@@ -64,7 +64,7 @@ class FrankaArm:
         try:
             with ours:
                 self.missing = _wait_connected(ours, address, kind)
-                """Sentences on what the process could not have, or ''."""
+                """Sentences on settings that the process was refused, or ''."""
         except BaseException:
             self._process.kill()  # no motion runs yet, and it may hang in the vendor's library
             self._process.join()
@@ -112,7 +112,7 @@ class FrankaArm:
         self._make_request(ArmRequest.RECOVER)
 
     def unfit(self) -> tuple[str, ...]:
-        """Say why the arm is in no mode to be moved."""
+        """Return the reason why the arm cannot be moved in its mode."""
         state = self.state()
         try:
             check_ready(state, self._address)
@@ -126,11 +126,11 @@ class FrankaArm:
         return self._mailboxes.report.read()
 
     def report(self) -> str:
-        """Say that, in lines; '' if no motion has ended."""
+        """Return the timing as lines; '' if no motion has ended."""
         return str(self.communication) if self.communication.cycles else ""
 
     def close(self) -> None:
-        """Bring the arm to rest and end the process; at once where no state comes: it hangs, or the line is dead.
+        """Bring the arm to rest and end the process; end it at once where no state comes.
 
         In a process forked from the one that began it, do nothing.
         """

@@ -1,4 +1,4 @@
-"""Connecting to a Franka arm through the vendor's own libraries, with a clear sentence where that fails."""
+"""Connection to a Franka arm through the vendor's libraries, with a clear sentence for each failure."""
 
 import re
 import socket
@@ -33,7 +33,7 @@ _NO_LOW_PASS_HZ = 1000.0
 """Cut-off frequency that libfranka takes for no filter; by default it filters at 100 Hz and limits rates."""
 _CREDENTIALS = struct.Struct("3i")
 _VERSION = re.compile(r"(?:server|protocol) version:? (\d+)")
-"""Where both libraries say what the arm speaks."""
+"""Pattern of the interface version in both libraries' messages."""
 
 
 class Library(NamedTuple):
@@ -51,7 +51,7 @@ LIBRARIES: dict[Kind, Library] = {
     "panda": Library("panda_py.libfranka", "panda-python", 5, "fr3 for an FR3"),
     "fr3": Library("pylibfranka", "pylibfranka", 10, "panda for a Panda, or update an FR3 to system 5.9 or later"),
 }
-"""That of each arm."""
+"""Library of each kind of arm."""
 _RECOVER = "free it from what it touches, then let it recover"
 _WAY_OUT = {
     "other": "it is not ready: open the brakes and activate FCI in Desk",
@@ -73,12 +73,12 @@ class MotionAborted(RobotError):
 
 
 def need_library(kind: Kind) -> None:
-    """Refuse to go on without the vendor's library for an arm, or what our own part needs: a MissingExtraError."""
+    """Require the vendor's library for an arm and our own extra; a MissingExtraError otherwise."""
     FRANKA.need("A Franka arm", LIBRARIES[kind].module.partition(".")[0], "ruckig")
 
 
 def check_ready(state: FrankaState, address: str) -> None:
-    """Raise a RobotError with the way out if the arm is in no mode to begin a motion."""
+    """Raise a RobotError with the way out if the arm's mode allows no motion."""
     if state.mode != "idle":
         raise RobotError(f"The arm at {address} is in {_mode(state)}; {_WAY_OUT[state.mode]}.")
 
@@ -158,7 +158,7 @@ class ArmLock:
             ) from None
 
     def release(self) -> None:
-        """Let another process have the arm."""
+        """Release the arm for other processes."""
         self._socket.close()
 
 
@@ -184,7 +184,7 @@ class FrankaClient:
     """Exceptions that the library raises."""
 
     def __init__(self, address: str, kind: Kind) -> None:
-        """Connect; what stands in the way is a RobotError.
+        """Connect; a failure is a RobotError.
 
         A machine that takes the connection and then says nothing is waited for without end: the libraries know no
         bound. `arm.FrankaArm`, which connects in a process of its own, gives up after half a minute.
@@ -285,7 +285,7 @@ class FrankaClient:
         )
 
     def close(self) -> None:
-        """Let the arm be used by somebody else."""
+        """Close the connection."""
         self._robot = None
         self._lock.release()
 
@@ -297,7 +297,7 @@ class FrankaClient:
 
     @contextmanager
     def _translated_errors(self, what: str) -> Iterator[None]:
-        """Turn what the library raises into a RobotError that says what the arm did not do."""
+        """Translate the library's errors into a RobotError that says what the arm did not do."""
         try:
             yield
         except self._failures as error:

@@ -1,4 +1,4 @@
-"""Within what a Franka arm takes velocity commands, one a millisecond, and from where on it stops by itself.
+"""Limits of velocity commands to a Franka arm, one a millisecond, and thresholds at which it stops by itself.
 
 The arm's own collision reflex lies above our thresholds, or it would stop the arm before we react.
 
@@ -56,9 +56,9 @@ _POSTURES = 1000
 BIAS_N = 5.0
 """Largest mean of the force estimate in free motion, per axis [N]."""
 LOWER_ABOVE_N = 10.0
-"""From our largest threshold to the arm's lower one [N]."""
+"""Distance from our largest threshold to the arm's lower one [N]."""
 UPPER_ABOVE_N = 30.0
-"""From our largest threshold to the arm's upper one, at which it stops by itself [N]."""
+"""Distance from our largest threshold to the arm's upper one, at which it stops by itself [N]."""
 MOST_N = 60.0
 """Most that upper one may be with the sequential detector [N]."""
 
@@ -111,7 +111,7 @@ def motion_limits(model: RobotModel, kind: str) -> FrankaLimits:
 
 
 def planned(description: RobotDescription, params: LimiterParams) -> RobotDescription:
-    """Return what a controller is to know of an arm: of its accelerations, the share that is used on the way."""
+    """Return the limits for a controller: of the accelerations, the share that is used on the way."""
     return replace(description, qdd_max=params.acceleration_share * description.qdd_max)
 
 
@@ -120,7 +120,7 @@ class FrankaParams(Checked):
     """Settings of the process that speaks with the arm."""
 
     limiter: LimiterParams = field(default_factory=LimiterParams)
-    """The way from one set-point to the next."""
+    """Motion from one set-point to the next."""
     stale_after_s: Positive = 0.05
     """Age at which a set-point no longer counts, and the arm is brought to rest [s]: five periods of a controller at
     100 Hz, from which on the controller itself brakes (`FailureParams.overrun_s`)."""

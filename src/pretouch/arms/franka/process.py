@@ -62,7 +62,7 @@ class VelocityMotion:
         communication: Communication,
         is_over: Callable[[], bool],
     ) -> None:
-        """Take the request's number, where commands come from and feedback goes, and what else ends the motion."""
+        """Take the request's number, the mailboxes, and a further condition that ends the motion."""
         self._number, self._mailboxes = number, mailboxes
         self._limits, self._params = settings.limits, settings.params
         self._communication, self._is_over = communication, is_over
@@ -99,7 +99,7 @@ class VelocityMotion:
         return _REST if self._stale else command.qd
 
     def _objection(self, command: ArmCommand, now: float) -> str:
-        """Say what about a command ends the motion, or ''."""
+        """Return the fault of a command that ends the motion, or ''."""
         wrong = ""
         if command is not self._command:
             self._command, wrong = command, refusal(command.qd, self._limits)
@@ -113,7 +113,7 @@ class VelocityMotion:
 
 
 def serve(settings: ProcessSettings, mailboxes: Mailboxes, started: Connection) -> None:
-    """Carry out commands until told to quit or the program is gone; tell it '', or as a sentence what is wrong."""
+    """Carry out commands until a request to quit or the end of the program; send it '', or a sentence on a failure."""
     leave_to_parent()
     with ExitStack() as opened:
         try:
@@ -131,7 +131,7 @@ def serve(settings: ProcessSettings, mailboxes: Mailboxes, started: Connection) 
 
 
 class ArmServer:
-    """Turns commands into what the client does, one after the other."""
+    """Carries out commands through the client, one after the other."""
 
     def __init__(self, client: FrankaClient, settings: ProcessSettings, mailboxes: Mailboxes) -> None:
         self._client, self._settings, self._mailboxes = client, settings, mailboxes
@@ -163,7 +163,7 @@ class ArmServer:
         self._send_feedback()
 
     def _send_feedback(self) -> None:
-        """Pass on the state there is while no motion runs."""
+        """Send the present state while no motion runs."""
         trouble = self._trouble[:2000]  # what a library says may be of any length
         self._mailboxes.feedback.put(Feedback(self._stamp, self._answered, False, trouble, self._state))
 

@@ -1,4 +1,4 @@
-"""`pretouch skin calibrate` without an arm to move: from what was recorded, or the motion for one's own driver."""
+"""`pretouch skin calibrate` without an arm to move: from a recording, or the motion for one's own driver."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""`pretouch skin calibrate ARM`: the arm makes the motion, all is recorded, and that is calibrated."""
+"""`pretouch skin calibrate ARM`: the arm makes the motion, which is recorded and used for the calibration."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -42,7 +42,7 @@ _AFTER_S = 0.5
 
 @dataclass(frozen=True)
 class CalibrateArm(Generic[A]):
-    """Let an arm make the calibration motion, find the pose of each unit from that, and write the skin file.
+    """Move an arm along the calibration motion, find the pose of each unit, and write the skin file.
 
     Nothing sees a person meanwhile. The exit code is 1 if a unit was refused or the motion ended early.
     """
@@ -86,7 +86,7 @@ class CalibrateArm(Generic[A]):
         return f"To calibrate from it: pretouch skin calibrate {join(words)}"
 
     def _moved(self, model: RobotModel, place: Path) -> bool:
-        """Let the arm make the motion, and record all; return whether that ended early."""
+        """Move the arm along the motion, and record it; return whether it ended early."""
         skin = skin_for(model, self.files.skin)
         setup = ArmSetup(
             name=self.files.arm,
@@ -137,7 +137,7 @@ def _plans(arm: Arm, model: RobotModel, params: PlanParams) -> list[Plan]:
 
 
 class Measurements:
-    """Records what units and joints measure while an arm moves; a `loop.Recorder`."""
+    """Recorder of units and joints while an arm moves; a `loop.Recorder`."""
 
     def __init__(
         self,
@@ -171,7 +171,7 @@ class Measurements:
 
 
 def _move(opened: OpenedArm, model: RobotModel, plans: list[Plan], measurements: Measurements) -> bool:
-    """Let the arm follow plans, and stand until all that was measured has arrived; return whether that ended early."""
+    """Move the arm along plans, and wait until all measurements have arrived; return whether it ended early."""
     controller, ending = plan_controller(model, np.array(opened.arm.read().q)), Ending()
     try:
         for plan in plans:

@@ -59,7 +59,7 @@ class CalibrationFiles:
     """Skin file with the units and their assumed links, which are checked; without it, links are identified. Of an arm
     that moves, the seven units that come with the package are heard then."""
     out: OptionalFile = None
-    """Skin file to write: places and how well they are known. Refused units are as in --skin, or left out."""
+    """Skin file to write, with places and their uncertainty. Refused units are as in --skin, or left out."""
     json: JsonFile = None
     replace: bool = False
     """Overwrite existing files."""
@@ -67,7 +67,7 @@ class CalibrationFiles:
     """panda, fr3, or the folder of an imported arm."""
 
     def check(self, inputs: Iterable[Path | None], record: Path | None = None) -> None:
-        """Refuse what could not be written, or is another input or output file too; --out may be --skin."""
+        """Refuse a file that could not be written, or is another input or output too; --out may be --skin."""
         if record and record.exists():  # whatever --replace says: a recording is never written over
             raise CalibrationError(f"The recording {record} exists already: give another file to --record.")
         read = [*inputs, *([] if self.skin and self.out and same_file(self.skin, self.out) else [self.skin])]
@@ -178,7 +178,7 @@ def _ahead(model: RobotModel, data: CalibrationData) -> tuple[float, tuple[str, 
 
 
 def _show(console: Console, answer: Calibration, notes: list[str]) -> None:
-    """Print a table of the units, and what is to be known of the data and of each unit, refused ones first."""
+    """Print a table of the units, and the findings on the data and each unit, refused ones first."""
     styles = ["bold red" if not unit.accepted else "yellow" if unit.findings else "" for unit in answer.units]
     console.print(PlainTable(_COLUMNS, [_cells(unit) for unit in answer.units], _TEXT, styles), crop=False)
     for unit in sorted(answer.units, key=lambda unit: unit.accepted):
@@ -204,7 +204,7 @@ def _cells(unit: UnitCalibration) -> tuple[str, ...]:
 
 
 def _written(answer: Calibration, model: RobotModel, believed: Skin | None, out: Path) -> str:
-    """Write the skin file, and say what it holds."""
+    """Write the skin file, and return a sentence on it."""
     try:
         skin = skin_of(answer, model, believed)
     except CalibrationError as error:

@@ -135,7 +135,7 @@ def _run(command: Run[Any], write: Callable[[Any], None]) -> int:
 
 
 def _check_free(place: Path) -> None:
-    """Raise an error where no recording can be written; a folder that is made for it is said."""
+    """Raise an error where no recording can be written; print the folder that is made for it."""
     if place.exists():
         raise RecordingError(f"{place} exists already: give another file to --record.")
     missing = not place.parent.exists()
@@ -145,7 +145,7 @@ def _check_free(place: Path) -> None:
 
 
 def _checked(standing: StandingArm, notes: Sequence[str]) -> Standstill:
-    """Check arm and units, print what there is to know, and raise RobotError for what forbids a run."""
+    """Check arm and units, print the findings, and raise a RobotError for those that forbid a run."""
     say(f"{standing.arm.name}: checking it; let it stand still and do not touch it.")
     rest, findings = standing.check()
     for note in (*notes, *(finding.sentence for finding in findings if finding.level == "warning")):
@@ -158,7 +158,7 @@ def _checked(standing: StandingArm, notes: Sequence[str]) -> Standstill:
 
 
 def _confirm(standing: StandingArm, opened: OpenedArm, rest: Standstill) -> None:
-    """Have the force sign confirmed by guided pushes."""
+    """Confirm the force sign by guided pushes."""
 
     def ask(direction: Direction) -> None:
         say(f"Push the hand gently, with about 15 N and for a second, towards {direction.words}.")
@@ -168,7 +168,7 @@ def _confirm(standing: StandingArm, opened: OpenedArm, rest: Standstill) -> None
 
 
 def _allowed_way(command: Run[Any], standing: StandingArm, opened: OpenedArm, rest: Standstill) -> Plan | None:
-    """Say what the arm will do, and ask; return its way to the start of its path, if it goes there first.
+    """Announce the motion, and ask; return the plan to the start of the path, if the arm goes there first.
 
     Before and after, the arm must stand where it was checked.
     """
@@ -192,7 +192,7 @@ def _executed(
     last: ExitStack,
     write: Callable[[Any], None],
 ) -> int:
-    """Let the arm move and report, whatever ends it; return 1 if it did not end as asked, or else 0.
+    """Move the arm and report, whatever ends it; return 1 if it did not end as requested, or else 0.
 
     All files of the run are opened first. From the report to the end of `last`, signals are only noted.
     """
