@@ -250,7 +250,7 @@ class ReplayPage:
         self._status.draw(step.mode, explanation, " · ".join(filter(None, (rates, finds(step)))), "", now)
 
     def run_name(self, run: int) -> str:
-        """Return the name of a run's controller, with its path where several runs share a profile."""
+        """Return the profile of a run, with the number and path of one of several runs."""
         runs = self._recorded.runs
         part = f", part {run + 1} of {len(runs)}, path of {runs[run].path.length:.2f} m" if len(runs) > 1 else ""
         return f"profile {runs[run].profile.name}{part}"

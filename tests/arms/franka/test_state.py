@@ -16,7 +16,7 @@ def test_a_push_on_the_arm_is_negative_for_the_vendor_positive_for_us_and_moves_
     assert ours.wrench is not None
     np.testing.assert_array_equal(ours.wrench, [0.0, 20.0, 0.0, 0.0, 0.0, 4.0])
     np.testing.assert_array_equal(ours.tau_ext, np.full(7, 2.0))
-    velocity = DecayingVelocity().begun(ours.wrench[:3]).velocity
+    velocity = DecayingVelocity().begin(ours.wrench[:3]).velocity
     assert velocity[1] > 0.1
     assert velocity[0] == velocity[2] == 0.0
 
