@@ -1,1 +1,1 @@
-"""Detectors and controllers held against each other on the same arms, contacts and bystanders."""
+"""Benchmarks of detectors and controllers on the same arms, contacts and bystanders."""

@@ -1,4 +1,4 @@
-"""Ways to keep clear of people and objects, compared in the same scenes: trials, summaries, tables."""
+"""Controllers that avoid people and objects, compared in the same scenes: trials, summaries, tables."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -24,14 +24,14 @@ PAIRED = (
     ("person", "paper-off", "cycle_time_s"),
     ("person", "paper", "cycle_time_s"),
 )
-"""Families with the references and measures that the goals of `pretouch` are about."""
+"""Family, reference and measure of each goal of `pretouch`."""
 _TOTALS = ("contact", "holds", "livelocks", "reactions", "false_reactions", "towards_person")
 _NOTE = (
     "Medians over the seeds, 10-90 % below. hit: trials with contact. least: least true distance of the surfaces."
     " impact: closing speed of the point that touches first. estimate: peak of the force estimate along the contact."
-    " true: peak of the 20 ms mean of the true force. clamp: largest mean over 0.5 s of unbroken contact. touch: from"
-    " the obstacle being within 0.8 m of the end-effector. turn: time of the second turn, > where the trial ended"
-    " before."
+    " true: peak of the 20 ms mean of the true force. clamp: largest mean over 0.5 s of unbroken contact. touch: time"
+    " of the first contact after the obstacle came within 0.8 m of the end-effector. turn: time of the second turn; >"
+    " if the trial ended before."
 )
 _NAMES = (Column("scenario", "scenario"), Column("contender", "contender"))
 _HIT = Column("hit", "contact", of="trials")
@@ -78,19 +78,19 @@ _MORE = (
     Column("along the path [mm/s]", "speed_m_s", 0, 1e3),
 )
 _NOTICED = 0.05
-"""Part of the larger of two values by which they have to differ."""
+"""Least difference that counts, as a fraction of the larger value."""
 _SPREAD = tuple({column.key: 0 for column in (*_COLUMNS, *_ABLATED, *_LESS, *_MORE) if column.digits is not None})
-"""Measures of which median and 10-90 % over the seeds are given; a trial without one is left out."""
+"""Measures whose median and 10-90 % over the seeds the tables show; trials without a value are left out."""
 
 
 def plays(seeds: SeedRange, quick: bool, contenders: Sequence[str] = (), names: Sequence[str] = ()) -> list[Play]:
     """Return all trials by scenario, contender and seed.
 
     Args:
-        seeds: which range.
-        quick: a small part of them.
-        contenders: none: all there are, and `pretouch` with each switch off alone in some scenarios.
-        names: of scenarios; none: all.
+        seeds: range of seeds.
+        quick: play a small part of the trials.
+        contenders: empty: all, and in some scenarios `pretouch` with one switch off at a time.
+        names: of scenarios; empty: all.
     """
     if len(set(contenders)) < len(contenders):
         raise ExperimentError(f"The baselines are {', '.join(contenders)}: name each once.")
@@ -108,7 +108,7 @@ def plays(seeds: SeedRange, quick: bool, contenders: Sequence[str] = (), names: 
 
 
 def trial(world: str, arm: str, cell: Cell, seed: int) -> Row:
-    """Play a trial of a contender, as its seed draws it of a set if one is named."""
+    """Play a trial of a contender; its seed draws arm and sensors from `world`, if that names a set."""
     scenario = scenarios()[cell["scenario"]]
     scene = setting(scenario, profile(profile_text(cell["contender"])), seed, arm)
     record = play(replace(scene.setup, world=world), scene.done)
@@ -121,7 +121,7 @@ def summarise(rows: list[Row]) -> Row:
 
     Returns:
         `cells`, one for each scenario and contender; `families`, all scenarios of a family together; `ablations`, cells
-        of `pretouch` with each switch off alone and as it is, on the same seeds; `paired`.
+        of `pretouch` unchanged and with one switch off at a time, on the same seeds; `paired`.
     """
     ended = [row | {"cycle_time_s": _ended(row, "cycle_time_s") if row["timed"] else None} for row in rows]
     off = [row for row in ended if row["contender"].startswith(WITHOUT)]
@@ -137,15 +137,15 @@ def summarise(rows: list[Row]) -> Row:
 
 
 def _ended(row: Row, measure: str) -> float:
-    """Return a time [s], infinite where it did not end."""
+    """Return a time [s]; infinite without an end."""
     return inf if row[measure] is None else float(row[measure])
 
 
 def paired(rows: list[Row]) -> list[Row]:
-    """Return the median part of a reference's measure that `pretouch` has, with 95 % bounds, as `PAIRED` says.
+    """Return the median ratio of `pretouch` to a reference for each measure of `PAIRED`, with 95 % bounds.
 
-    A family's scenarios and seeds count together. A force counts where the reference touched; without contact
-    `pretouch` has none of it. A time counts where either came to an end; what did not is infinite, in the result None.
+    A family's scenarios and seeds count together. A force counts if the reference touched; without contact the force
+    of `pretouch` is 0. A time counts if one of the two ended; a time without an end is infinite, in the result None.
     """
     every = []
     for family, reference, measure in PAIRED:
@@ -155,14 +155,14 @@ def paired(rows: list[Row]) -> list[Row]:
         parts = [part for theirs, ours in pairs if not isnan(part := _part(theirs, ours, measure))]
         if parts:
             low, high = median_bounds(parts)
-            middle = np.percentile(parts, 50, method="higher")  # of an infinite value no mean is taken
+            middle = np.percentile(parts, 50, method="higher")  # no mean with an infinite value
             numbers = {"part": finite(middle), "low": finite(low), "high": finite(high), "trials": len(parts)}
             every.append({"family": family, "contender": BASE, "reference": reference, "measure": measure} | numbers)
     return every
 
 
 def _part(theirs: Row, ours: Row, measure: str) -> float:
-    """Return a measure by the reference's; NaN where it does not count."""
+    """Return the ratio of a measure to the reference's; NaN if it does not count."""
     if measure.endswith("_s"):
         whole = _ended(theirs, measure)
         return _ended(ours, measure) / whole if whole else nan
@@ -170,11 +170,11 @@ def _part(theirs: Row, ours: Row, measure: str) -> float:
 
 
 def tables(summary: Row) -> list[TextTable]:
-    """Return what is lost, each contender in each scenario, a table a family, and ablations."""
+    """Return the losses, a table of contenders and scenarios for each family, and the ablations."""
     texts = {scene.family: scene.text for scene in scenarios().values()}
     note = (
-        "On fewer seeds than the tables above: pretouch here has the same. The switches of detection are in the tables"
-        " of contact detection."
+        "Fewer seeds than in the tables above; pretouch has the same seeds here. The tables of contact detection have"
+        " the switches of detection."
     )
     by_scene = [cell for _, cells in grouped(summary["ablations"], ("scenario",)) for cell in cells]
     every = [
@@ -194,22 +194,22 @@ def losses(cells: list[Row]) -> TextTable:
     for key, group in grouped(cells, ("scenario",)):
         for ours in (cell for cell in group if cell["contender"] == BASE):
             for column in (*_LESS, *_MORE):
-                shown = column.text(ours)
-                better = [cell for cell in _better(group, ours, column) if column.text(cell) != shown]
+                text = column.text(ours)
+                better = [cell for cell in _better(group, ours, column) if column.text(cell) != text]
                 if better:
                     others = ", ".join(f"{cell['contender']} {column.text(cell)}" for cell in better)
-                    lines.append((key["scenario"], column.heading, shown, others))
+                    lines.append((key["scenario"], column.heading, text, others))
     return TextTable(
         "Where others do better than pretouch",
         ("scenario", "median of", "pretouch", "better"),
         tuple(lines),
         "Every measure of every scenario in which another contender's median is better by more than 5 % and in the"
-        " digits shown, whatever it pays for that elsewhere; > is what did not end in its trial.",
+        " digits shown, whatever that contender loses elsewhere; > is a time that did not end in its trial.",
     )
 
 
 def _better(group: list[Row], ours: Row, column: Column) -> list[Row]:
-    """Return the cells that are better than that of `pretouch`, the best first."""
+    """Return the cells that are better than the cell of `pretouch`, the best first."""
 
     def cost(cell: Row) -> float:
         spread = cell[column.key]

@@ -1,4 +1,4 @@
-"""What a trial of the avoidance benchmark measures: what truly happened, and what was commanded."""
+"""Measures of a trial of the avoidance benchmark: true contacts and distances, and the commanded motion."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -17,16 +17,16 @@ from pretouch_lab.table import peak, rounded
 from pretouch_lab.trial import Record
 
 _CLAMP_S = 0.5
-"""A contact that lasts this long is quasi-static (ISO/TS 15066) [s]."""
+"""Least duration of a quasi-static contact (ISO/TS 15066) [s]."""
 _CAUSE_S = 0.5
-"""A reaction this long after a true contact still answers it [s]."""
+"""Longest time from a true contact to a reaction to it [s]."""
 _ECHO_S = 3.0
-"""A later reaction this long after it is its echo [s]."""
+"""Longest time from a true contact to a repeated reaction, its echo [s]."""
 _D_MAX_M = 0.8
-"""Distance of the end-effector from which the first contact counts, where a scenario names no other [m]."""
+"""Default distance of the obstacle from the end-effector at which the time to contact starts [m]."""
 _BEGINNING_S = 0.5
 _LOOK_EVERY = 10
-"""Control steps between two that are examined for livelocks."""
+"""Control steps from one test for a livelock to the next."""
 
 
 def measured(record: Record, setting: Setting, scenario: Scenario) -> Row:
@@ -53,12 +53,12 @@ def measured(record: Record, setting: Setting, scenario: Scenario) -> Row:
 
 
 def contact(record: Record, near: BoolArray, towards: Callable[[int], FloatArray]) -> Row:
-    """First touch, impact speed, and forces.
+    """First contact, impact speed, and forces.
 
     Args:
         record: of the trial, with S steps.
-        near: (S,) whether the obstacle is so near that the first contact counts from then on.
-        towards: gives for a step the direction (3,) from the arm to the obstacle where they are nearest.
+        near: (S,) true where the obstacle is near; the time to contact starts at the first such step.
+        towards: returns for a step the direction (3,) from the arm to the obstacle where they are nearest.
     """
     touch, times = record.first_contact(), record.times()
     force = np.linalg.norm(record.true_force, axis=1)
@@ -86,7 +86,7 @@ def contact(record: Record, near: BoolArray, towards: Callable[[int], FloatArray
 
 
 def _hand_velocity(record: Record, at: int) -> FloatArray:
-    """Velocity (3,) [m/s] of the person's hand before a step; zero of what stands still."""
+    """Velocity (3,) [m/s] of the person's hand before a step; zero without a hand."""
     before = max(at - 2, 0)
     moved = record.hand_position[at] - record.hand_position[before]
     duration = record.steps[at].stamp - record.steps[before].stamp
@@ -94,7 +94,7 @@ def _hand_velocity(record: Record, at: int) -> FloatArray:
 
 
 def clamping(time: FloatArray, force: FloatArray) -> float:
-    """Largest mean (N) of a force (T,) [N] over half a second in which it is never below 1 N; 0 if there is none."""
+    """Largest mean [N] of a force (T,) [N] over half a second without a value below 1 N; 0 without such a span."""
     width = max(1, round(_CLAMP_S / float(time[1] - time[0]))) if len(time) > 1 else 1
     if len(force) < max(2, width):
         return 0.0
@@ -103,9 +103,9 @@ def clamping(time: FloatArray, force: FloatArray) -> float:
 
 
 def tracking(steps: list[ControlStep], length: float) -> Row:
-    """Error and progress along a path whose turn has a length [m]; 0 of a hand that is held.
+    """Error and progress along a path; `length` is that of one turn [m], 0 for an arm that holds its place.
 
-    The cycle time is that of the second turn; None if it was not finished.
+    The cycle time is the time of the second turn; None for an unfinished turn.
     """
     row: Row = dict.fromkeys(("tracking_rms_m", "speed_m_s", "cycle_time_s"))
     if not steps:
@@ -123,7 +123,7 @@ def tracking(steps: list[ControlStep], length: float) -> Row:
 def jerk(steps: list[ControlStep], period: float) -> float:
     """Rms jerk of the commanded joint velocities [rad/s^3].
 
-    The first half second is left out: every arm begins to move then.
+    The first half second, in which every arm starts to move, is left out.
     """
     commands = np.array([s.command for s in steps[round(_BEGINNING_S / period) :]])
     third = np.diff(commands, n=2, axis=0) / period**2 if len(commands) > 2 else np.zeros(1)
@@ -131,7 +131,7 @@ def jerk(steps: list[ControlStep], period: float) -> float:
 
 
 def holds(steps: list[ControlStep], period: float) -> Row:
-    """Holds after the start, with their events."""
+    """Count the holds after the start, with their durations and events."""
     begun = [b for a, b in pairwise(steps) if b.mode is Mode.HOLD and a.mode is not Mode.HOLD]
     return {
         "holds": len(begun),
@@ -141,7 +141,7 @@ def holds(steps: list[ControlStep], period: float) -> Row:
 
 
 def reactions(record: Record) -> Row:
-    """Reactions without a contact, and such against the force of the contact they answer or echo."""
+    """Count reactions, those without a contact, and those against the force of their contact."""
     force, time = record.true_force, record.true_time
     touching = time[np.linalg.norm(force, axis=1) > TOUCH_N]
     false = towards = 0
@@ -156,9 +156,9 @@ def reactions(record: Record) -> Row:
 
 
 def livelocks(record: Record, setting: Setting, limits: dict[str, Any] | None) -> Row:
-    """How often and how long [s] the path's phase grows by less than `advance_m` in `within_s` while nothing blocks it.
+    """Count livelocks: the path's phase grows by less than `advance_m` in `within_s` although the path is clear.
 
-    Nothing blocks it if the obstacle is farther than `clear_m` from the next `ahead_m` of the path all that time.
+    The path is clear if the obstacle is farther than `clear_m` from its next `ahead_m` all that time.
     """
     if limits is None:
         return {"livelocks": None, "livelock_s": None}
@@ -177,9 +177,9 @@ def livelocks(record: Record, setting: Setting, limits: dict[str, Any] | None) -
 
 
 def stuck_for(phase: FloatArray, clear: BoolArray, width: int, advance: float) -> BoolArray:
-    """Tell of each of S instants whether it lies in a span of `width` with less than `advance` [m] of way, all clear.
+    """Return flags (S,) of the instants in a clear span of `width` with less than `advance` [m] of progress.
 
-    `phase` (S,) [m] is the way so far, `clear` (S,) whether the way ahead is clear.
+    `phase` (S,) [m] is the progress so far; `clear` (S,) is true where the path ahead is clear.
     """
     stuck = np.zeros(len(phase), np.bool_)
     for end in range(width, len(phase)):

@@ -1,4 +1,4 @@
-"""What the benchmark of avoidance plays: scenarios as their files fix them, and the setting that a seed decides."""
+"""Scenes of the avoidance benchmark: scenarios from files, and the setting that a seed draws."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -27,45 +27,45 @@ from pretouch_lab.experiments.avoidance import Visit, Visitor
 from pretouch_lab.trial import Setup
 
 FAMILIES = ("srdo", "drdo", "person", "hand", "static", "sensing", "arm", "walking")
-"""Files, less `avoidance-`, in the order in which they are shown."""
+"""Files without the prefix `avoidance-`, in the order of the tables."""
 Table = dict[str, Any]
 PANDA = "panda"
-"""The arm that the scenarios are laid out for."""
+"""The arm of the scenarios' coordinates."""
 _UNMOVED, _USUAL = Placement(), PlantParams()
 _HELD_M = 0.001
-"""Length of the path of a hand that is held: a path has to have one."""
+"""Length of the path of an arm that holds its place [m]: a path needs a length."""
 _BRAKING_M_S2 = 4.0
-"""How hard one who walks slows down at the end."""
+"""Deceleration of a walking person at the end [m/s^2]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """One scene with all that its file says; trials of it differ by their seed."""
+    """One scene with the values of its file; its trials differ by their seed."""
 
     name: str
     family: str
     text: str
-    """What happens, in a sentence."""
+    """Description in one sentence."""
     params: Table
-    """The file's keys, with what this scenario has in place of them; `count` and `quick` are trials of a contender."""
+    """The file's keys, replaced by those of this variant; `count` and `quick` are numbers of trials of a contender."""
 
     def seeds(self, seeds: SeedRange, quick: bool) -> list[int]:
         """Return the seeds of a run's trials."""
         return self.first_seeds(seeds, self.params["quick" if quick else "count"])
 
     def first_seeds(self, seeds: SeedRange, count: int) -> list[int]:
-        """Return so many of the seeds of a range."""
+        """Return the first `count` seeds of a range."""
         return [seed_of(self.params, seeds, number) for number in range(count)]
 
 
 @cache
 def scenarios() -> dict[str, Scenario]:
-    """Return all scenarios by their names; a file that was changed since is an ExperimentError."""
+    """Return all scenarios by name. Raises ExperimentError for a changed file."""
     every: dict[str, Scenario] = {}
     for family in FAMILIES:
         shared = dict(scenario(f"avoidance-{family}"))
         for variant in shared.pop("variant"):
-            own = {  # of a table only what the variant names
+            own = {  # a variant replaces single keys of a table
                 key: shared[key] | value if isinstance(shared.get(key), dict) else value
                 for key, value in variant.items()
             }
@@ -75,11 +75,11 @@ def scenarios() -> dict[str, Scenario]:
 
 @dataclass(frozen=True)
 class Setting:
-    """All that a trial is made of."""
+    """Setup, obstacle and end of a trial."""
 
     setup: Setup
     shape: ShapeAt
-    """The obstacle, given where the person's hand is."""
+    """The obstacle's surface as a function of the position of the person's hand."""
     done: Callable[[ControlStep, Plant], bool]
 
 
@@ -91,23 +91,23 @@ def arm(name: str = PANDA) -> RobotModel:
 
 @cache
 def place(name: str = PANDA) -> Placement:
-    """Return where the scenarios' paths and places are for an arm."""
+    """Return the placement of the scenarios' paths and obstacles for an arm."""
     return placement_for(arm(name))
 
 
 @cache
 def skin(name: str, of: str = PANDA) -> Skin:
-    """Return a skin by the name that scenarios have for it; an arm other than the Panda has its own for each."""
+    """Return the skin of a name in the scenarios; another arm than the Panda always has its own skin."""
     if of != PANDA:
         return skin_for(arm(of), "")
     return load_skin(scenario_path("dense_skin.toml"), arm()) if name == "dense" else paper_skin(arm())
 
 
 def setting(scenario: Scenario, profile: Profile, seed: int, name: str = PANDA) -> Setting:
-    """Make the setting of a trial with the arm of a name."""
+    """Return the setting of a trial with the named arm."""
     params, model = scenario.params, arm(name)
     path = path_of(params["path"], place(name))
-    units = skin(params["skin"], name) if profile.perception else Skin((), model)  # none measures what nobody reads
+    units = skin(params["skin"], name) if profile.perception else Skin((), model)  # no units if the profile reads none
     error = params.get("misplaced")
     shape, scene = _obstacle(params, seed, name)
     setup = Setup(
@@ -131,7 +131,7 @@ def setting(scenario: Scenario, profile: Profile, seed: int, name: str = PANDA) 
 
 
 def path_of(params: Table, where: Placement = _UNMOVED) -> Path:
-    """Return the path that a scenario names, where it is for an arm."""
+    """Return the path of a scenario at its place for an arm."""
     if params["kind"] == "held":
         x, y, z = where.point(*params["point"])
         return segment((x, y, z), (x, y, z + _HELD_M))
@@ -141,28 +141,28 @@ def path_of(params: Table, where: Placement = _UNMOVED) -> Path:
 
 
 def plant_of(params: Table, usual: PlantParams = _USUAL) -> PlantParams:
-    """Return the arm's errors; `friction_factor` is that of all joints' friction."""
+    """Return the errors of the arm; `friction_factor` scales the friction of all joints."""
     factor = params.get("friction_factor", 1.0)
     own = {key: value for key, value in params.items() if key != "friction_factor"}
     return replace(usual, friction_f1_nm=tuple(factor * f for f in usual.friction_f1_nm), **own)
 
 
 class Walker:
-    """Comes straight from one point to another at a speed, and stays: a script of `pretouch.sim.hand`."""
+    """A hand that moves straight from one point to another and stays: a script of `pretouch.sim.hand`."""
 
     def __init__(self, begin: FloatArray, end: FloatArray, speed: float, start: float, force_max: float) -> None:
-        """Take the points (3,) [m], the speed [m/s], when it starts [s] and its largest force [N]."""
+        """Take the points (3,) [m], the speed [m/s], the start [s] and the largest force [N]."""
         self.speed, self.start, self._begin, self._way, self._force = speed, start, begin, end - begin, force_max
         self._length = float(np.linalg.norm(self._way))
 
     def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
-        """Return where it wants to be at a time [s]."""
+        """Return the position to reach at a time [s]."""
         share = travelled(time - self.start, self._length, self.speed) / self._length
         return HandGoal(self._begin + self._way * share, self._force)
 
 
 def travelled(time: float, length: float, speed: float) -> float:
-    """Way [m] of one who starts at full speed [m/s] at time 0 [s] and brakes to rest at the end of a length [m]."""
+    """Return the distance [m] after a start at full speed [m/s] at time 0 [s], with braking to rest at `length` [m]."""
     a = _BRAKING_M_S2
     speed = min(speed, sqrt(2 * a * length))
     coasting = length / speed - speed / (2 * a)
@@ -171,19 +171,19 @@ def travelled(time: float, length: float, speed: float) -> float:
 
 
 def _obstacle(params: Table, seed: int, name: str) -> tuple[ShapeAt, Table]:
-    """Return an obstacle's surface, and what a `Setup` has of it."""
-    given, where = params["obstacle"], place(name)
-    stiffness = given["contact_stiffness_n_m"]
-    match given["kind"]:
+    """Return an obstacle's surface, and its fields of a `Setup`."""
+    obstacle, where = params["obstacle"], place(name)
+    stiffness = obstacle["contact_stiffness_n_m"]
+    match obstacle["kind"]:
         case "board":
             way = params["path"]
             return _standing(static_scene(way["kind"], way["side"], stiffness, seed, where).boxes[0])
         case "box":
-            (x, y, _), z, (a, b, c) = where.moved(*given["center"]), given["center"][2], given["half_size"]
+            (x, y, _), z, (a, b, c) = where.moved(*obstacle["center"]), obstacle["center"][2], obstacle["half_size"]
             return _standing(Box("object", (x, y, z), (a, b, c), stiffness))  # it stands on the floor
         case "visitor":
-            return _visiting(given, seed, name)
-    return _walking(given, seed, where)
+            return _visiting(obstacle, seed, name)
+    return _walking(obstacle, seed, where)
 
 
 def _standing(box: Box) -> tuple[ShapeAt, Table]:
@@ -191,28 +191,28 @@ def _standing(box: Box) -> tuple[ShapeAt, Table]:
     return lambda _: shape, {"scene": SceneSpec(boxes=(box,))}
 
 
-def _visiting(given: Table, seed: int, name: str) -> tuple[ShapeAt, Table]:
-    """Place a person who holds a hand beside the path or into it on one side, as in the paper's experiment."""
+def _visiting(obstacle: Table, seed: int, name: str) -> tuple[ShapeAt, Table]:
+    """Place a person who holds a hand beside the path or in it on one side, as in the paper's experiment."""
     rng, where = np.random.default_rng([seed, 21]), place(name)
     side = rng.choice([-1.0, 1.0])
-    # as the hands of the paper's experiment are moved, from where this one is for the Panda
+    # shifted like the hands of the paper's experiment, from the place for the Panda
     off = np.subtract(where.visited("beside", side), _UNMOVED.visited("beside", side))
-    at = np.array([given["x_m"], side * given["y_m"], given["z_m"]]) + off
-    visit = Visit(given["arrive_s"], given["leave_s"], at + given["spread_m"] * rng.uniform(-1, 1, 3))
-    spec = HandSpec(given["radius_m"], given["mass_kg"], given["contact_stiffness_n_m"])
+    at = np.array([obstacle["x_m"], side * obstacle["y_m"], obstacle["z_m"]]) + off
+    visit = Visit(obstacle["arrive_s"], obstacle["leave_s"], at + obstacle["spread_m"] * rng.uniform(-1, 1, 3))
+    spec = HandSpec(obstacle["radius_m"], obstacle["mass_kg"], obstacle["contact_stiffness_n_m"])
     return lambda hand: Ball(hand, spec.radius), {"scene": SceneSpec(hand=spec), "hand": Visitor(arm(name), (visit,))}
 
 
-def _walking(given: Table, seed: int, where: Placement) -> tuple[ShapeAt, Table]:
-    """Place a person or a hand that comes straight in and stays; the seed draws speed, time and perhaps the side."""
+def _walking(obstacle: Table, seed: int, where: Placement) -> tuple[ShapeAt, Table]:
+    """Place a person or a hand that moves straight in and stays; the seed draws speed, time and perhaps the side."""
     rng = np.random.default_rng([seed, 20])
-    side = rng.choice([-1.0, 1.0]) if given.get("both_sides") else 1.0
-    begin, end = (np.array(where.moved(*given[key])) * [1.0, side, 1.0] for key in ("from", "to"))
-    speed, start = rng.uniform(*given["speed_m_s"]), rng.uniform(*given["start_s"])
+    side = rng.choice([-1.0, 1.0]) if obstacle.get("both_sides") else 1.0
+    begin, end = (np.array(where.moved(*obstacle[key])) * [1.0, side, 1.0] for key in ("from", "to"))
+    speed, start = rng.uniform(*obstacle["speed_m_s"]), rng.uniform(*obstacle["start_s"])
     x, y, z = begin.tolist()
-    spec = HandSpec(given["radius_m"], given["mass_kg"], given["contact_stiffness_n_m"], (x, y, z))
+    spec = HandSpec(obstacle["radius_m"], obstacle["mass_kg"], obstacle["contact_stiffness_n_m"], (x, y, z))
     return lambda hand: Ball(hand, spec.radius), {
         "scene": SceneSpec(hand=spec),
-        "hand": Walker(begin, end, speed, start, given["force_max_n"]),
-        "person": PersonArm(2.0 * speed, given["spring_n_m"], given["damping_n_s_m"]),
+        "hand": Walker(begin, end, speed, start, obstacle["force_max_n"]),
+        "person": PersonArm(2.0 * speed, obstacle["spring_n_m"], obstacle["damping_n_s_m"]),
     }

@@ -1,4 +1,4 @@
-"""The calibration of many random skins in simulation: how far units are found from where they sit."""
+"""Errors of the calibration of many random skins in simulation."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -31,7 +31,7 @@ from pretouch_lab.run import Cell, Row
 from pretouch_lab.table import Column, grouped, table
 
 _PARTS = {"position": slice(3, 6), "orientation": slice(0, 3), "pose": slice(0, 6)}
-"""Of an error of a pose: rotation vector, position."""
+"""Slices of the error of a pose: rotation vector, then position."""
 NOT_FOUND: Row = {
     "position_error_m": None,
     "orientation_error_deg": None,
@@ -43,16 +43,16 @@ NOT_FOUND: Row = {
     "clock_error_s": None,
     "link_found": False,
 }
-"""Of a unit without an answer, or with one on another link."""
+"""Row of a unit without a result, or with a result on another link."""
 DATA_SHEET = ImuParams(misalignment_deg=0.0)
-"""The sensors' own errors. How a board is glued on turns the IMU's frame itself, and no IMU can tell it."""
+"""Errors of the sensors. A board glued on at an angle turns the IMU's frame, which no IMU can measure."""
 CLOCK_ERROR_S = 0.02
-"""Each unit's clock is off by up to this [s]."""
+"""Largest offset of a unit's clock [s]."""
 _LARGEST_COUNT = 32767
 
 
 def trial(arm: str, plan: Plan, cell: Cell, seed: int) -> Row:
-    """Calibrate a random skin in simulation: a row for each unit, and how long the calibration took [s].
+    """Calibrate a random skin in simulation; return a row for each unit, and the computing time [s].
 
     Each skin has one unit on each link from the second on; the seed draws skin, arm and sensors.
     """
@@ -80,13 +80,13 @@ def place_row(model: RobotModel, unit: SensorUnit, place: Place, late: float) ->
 
     Args:
         model: the arm.
-        unit: as it truly sits.
-        place: the answer. A link that is fixed to the true one is as good as that: no motion can tell them apart.
-        late: by how much the unit's stamps truly are late [s].
+        unit: the unit at its true place.
+        place: the result. A link fixed to the true link counts as the true one: no motion can separate them.
+        late: true delay of the unit's stamps [s].
 
     Returns:
-        Errors, standard deviations, and errors squared and divided by the covariance, whose mean is to be the number of
-        their dimensions: 3 of the position, 3 of the orientation, 6 of both.
+        Errors, standard deviations, and errors squared over the covariance (NEES). A correct covariance has means
+        of NEES equal to the dimensions: 3 for the position, 3 for the orientation, 6 for both.
     """
     true, answered = (model.link_index(name) for name in (unit.link, place.link))
     if not np.array_equal(model.moved_by[true], model.moved_by[answered]):
@@ -115,9 +115,9 @@ def simulate(
     clock_error_s: float = CLOCK_ERROR_S,
     links_known: bool = True,
 ) -> CalibrationData:
-    """Let an arm follow a plan, and measure; stamps count from its beginning.
+    """Simulate an arm that follows a plan; stamps count from the start of the plan.
 
-    The seed decides errors of arm, sensors and clocks, and all noise.
+    The seed draws errors of arm, sensors and clocks, and all noise.
     """
     plant = Plant(model, SceneSpec(), PlantParams(), plan.start, seed)
     samples: list[ImuSample] = []
@@ -135,7 +135,7 @@ def simulate(
 
 
 def _followed(plant: Plant, model: RobotModel, plan: Plan) -> tuple[JointTrace, float]:
-    """Let an arm follow a plan; return the joint positions measured meanwhile, and when it began [s]."""
+    """Let an arm follow a plan; return the measured joint positions, and the start [s]."""
     controller = plan_controller(model, plan.start)
     commander = PlanCommander(controller, plan, lambda: plant.time)
     states: list[tuple[float, FloatArray]] = []
@@ -153,7 +153,7 @@ def _followed(plant: Plant, model: RobotModel, plan: Plan) -> tuple[JointTrace, 
 
 
 def clock_errors(count: int, seed: int, most: float = CLOCK_ERROR_S) -> FloatArray:
-    """By how much the stamps of each of so many units are late (K,) [s]."""
+    """Draw the delays (K,) [s] of the stamps of `count` units."""
     return np.random.default_rng([seed, 12]).uniform(-most, most, count)
 
 
@@ -174,23 +174,23 @@ _COLUMNS = (
 
 
 def tables(rows: Sequence[Row], motion_s: float) -> list[TextTable]:
-    """Show how far our answers are off, and whether they say so, after a motion of so long [s]."""
+    """Return a table of errors and their stated deviations after a motion of `motion_s` seconds."""
     units = [unit for row in rows for unit in row["units"]]
     links = [(key["link"], some) for key, some in grouped(units, ("link",))]
     note = (
-        "Medians; NEES, the error squared over its covariance, are means: 3, 3 and 6 if the covariance is honest."
-        " Sigma: in the worst direction. Clock: error of the found offset, which is up to 20 ms either way. Computing"
-        f" takes {np.median([row['compute_s'] for row in rows]):.1f} s a skin. Sensor errors are the data sheet's; how"
-        " a board is glued on is left out, for no IMU can tell it."
+        "Medians; NEES, the error squared over its covariance, are means: 3, 3 and 6 for a correct covariance. Sigma:"
+        " in the worst direction. Clock: error of the estimated offset; true offsets are up to 20 ms. The computation"
+        f" takes {np.median([row['compute_s'] for row in rows]):.1f} s a skin. Sensor errors are the data sheet's,"
+        " without the angle of a glued board, which no IMU can measure."
     )
     title = (
-        f"Where units sit, found in {motion_s:.0f} s of motion: {len(links)} units on each of {len(rows)} random skins"
+        f"Calibrated places after {motion_s:.0f} s of motion: {len(links)} units on each of {len(rows)} random skins"
     )
     return [table(title, _COLUMNS, [_errors(name, some) for name, some in (*links, ("all", units))], note)]
 
 
 def _errors(name: str, units: list[Row]) -> Row:
-    """Median size, largest and mean of each number of some units, None where none has it."""
+    """Median, largest and mean size of each number of some units; None without values."""
     row: Row = {"link": name, "units": len(units), "found": sum(unit["link_found"] for unit in units)}
     for key in NOT_FOUND:
         values = np.abs([unit[key] for unit in units if unit[key] is not None])

@@ -1,4 +1,4 @@
-"""Contacts: true forces on the surface of an arm that does not react, brought by a hand that the skin may see."""
+"""Contacts: true forces on the surface of an arm that does not react; the skin may see the hand that pushes."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +15,7 @@ from pretouch_lab.bench.streams import AWAY, Alone, Stream, record
 
 _TRIES = 400
 _SINK_M = 0.002
-"""How deep the hand may seem to be in the arm where it touches it [m]."""
+"""Largest apparent penetration of the hand into the arm at a contact [m]."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Touching:
     duration_s: float
     """From the start of the rise to the end of the fall [s]."""
     start: float
-    """[s]"""
+    """Start of the rise [s]."""
     point: FloatArray
     """(3,) link frame [m]."""
     normal: FloatArray
@@ -40,11 +40,11 @@ class Touching:
     inwards: FloatArray
     """(3,) unit vector of the force on the arm, link frame."""
     hand_radius: float
-    """Of the visible hand that brings it [m]."""
+    """Radius of the visible hand that pushes [m]."""
 
     @property
     def end(self) -> float:
-        """When the force is gone [s]."""
+        """End of the fall [s]."""
         return self.start + self.duration_s
 
     def size_n(self, time: float) -> float:
@@ -53,15 +53,15 @@ class Touching:
         return self.force_n * min(1.0, edge) if edge > 0 else 0.0
 
     def onset(self, of_n: float) -> float:
-        """When the force passes a size [s]."""
+        """Time at which the force rises above `of_n` [s]."""
         return self.start + self.rise_s * of_n / self.force_n
 
 
 def plan(number: int, hand_radius: float, seed: int) -> list[Touching]:
-    """Draw so many contacts: the seed says where, how and when."""
+    """Draw `number` contacts: the seed decides places, forces and times."""
     family, rng = scenario("contacts"), np.random.default_rng([seed, 32])
     at, touches = float(family["duration"]["warm_up_s"]), list[Touching]()
-    q = brought_to(model(), path_of("rest").point(0.0))  # where the paths begin
+    q = brought_to(model(), path_of("rest").point(0.0))  # start of the paths
     for _ in range(number):
         touches.append(touching(family["contact"], q, at, hand_radius, rng))
         at = touches[-1].end + rng.uniform(*family["duration"]["gap_s"])
@@ -71,9 +71,9 @@ def plan(number: int, hand_radius: float, seed: int) -> list[Touching]:
 def touching(
     chosen: dict[str, Any], q: FloatArray, at: float, hand_radius: float, rng: np.random.Generator, name: str = ""
 ) -> Touching:
-    """Draw a contact that begins at a time [s], in a posture (n,) [rad], on a link of that name or on any.
+    """Draw a contact that begins at a time [s], in a posture (n,) [rad], on the named link or on any link.
 
-    `chosen` is what a scenario file has of contacts.
+    `chosen` is the table of contacts in a scenario file.
     """
     every = [(k, duration) for k, kind in enumerate(chosen["kind"]) for duration in kind["durations_s"]]
     k, duration = every[int(rng.integers(len(every)))]
@@ -90,9 +90,9 @@ def touching(
 def place_on(
     link: int, q: FloatArray, radius: float, rng: np.random.Generator, from_m: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Draw a point and normal (3,) of a link's surface that a hand can come to along the normal, link frame.
+    """Draw a point and normal (3,) of a link's surface that a hand can reach along the normal, link frame.
 
-    That is judged in one posture (n,) [rad]. Where no free place is found, the last one drawn is taken.
+    The test is for one posture (n,) [rad]. If no place is free, the last one is returned.
     """
     kin, arm = model().kinematics(q), model().capsules
     _, a, b, _ = placed(arm, kin)
@@ -108,10 +108,10 @@ def place_on(
 
 
 class Toucher:
-    """Lays planned forces on an arm, and says where the hand is that brings them."""
+    """Applies planned forces to an arm, and gives the position of the hand that pushes."""
 
     def __init__(self, plant: Plant, touches: list[Touching]) -> None:
-        """Attach to a plant: forces act from then on, whatever the arm does."""
+        """Attach to a plant, so that the forces act whatever the arm does."""
         hand = scenario("contacts")["hand"]
         self._plant, self._touches = plant, touches
         self._from, self._speed = hand["from_m"], hand["speed_m_s"]
@@ -121,7 +121,7 @@ class Toucher:
         plant.before_each_step(self._push)
 
     def _current(self, time: float) -> Touching | None:
-        """Return the contact whose hand is on its way or there, None in between."""
+        """Return the contact whose hand approaches, touches or leaves, None in between."""
         while self._next + 1 < len(self._touches) and time >= self._touches[self._next + 1].start - self._way_s:
             self._next += 1
         touch = self._touches[self._next] if self._touches else None
@@ -130,7 +130,7 @@ class Toucher:
         return touch
 
     def _push(self, time: float) -> float:
-        """Let the force of now act, and return when there is the next: MuJoCo's acts at a body's centre of mass."""
+        """Apply the present force at the body's centre of mass, as MuJoCo needs it; return the time of the next one."""
         data, forces = self._plant.mj_data, self.forces(time)
         data.xfrc_applied[self._pushed] = 0.0
         if not forces:
@@ -140,7 +140,7 @@ class Toucher:
         return time
 
     def forces(self, time: float) -> list[PointForce]:
-        """Return the force that acts at a time, for sensors of forces without a contact of the simulation."""
+        """Return the force that acts at a time, for touch sensors: the simulation has no contact for it."""
         touch = self._current(time)
         if touch is None or touch.size_n(time) <= 0.0:
             return []
@@ -149,7 +149,7 @@ class Toucher:
         return [PointForce(touch.link, at, touch.size_n(time) * (rotation @ touch.inwards))]
 
     def hand(self, time: float) -> FloatArray:
-        """Where the hand's centre is at a time (3,) [m], base frame."""
+        """Centre of the hand (3,) [m] at a time [s], base frame."""
         touch = self._current(time)
         if touch is None:
             return AWAY
@@ -159,7 +159,7 @@ class Toucher:
 
 
 def contact_stream(arm: ArmCell, seed: int) -> tuple[Stream, list[Touching]]:
-    """Let an arm be touched; return its stream and its contacts."""
+    """Simulate an arm that is touched; return its stream and its contacts."""
     sensing = sensing_of(arm.sensing, seed)
     touches = plan(arm.count, sensing.hand_radius, seed)
     what = Alone(
@@ -170,5 +170,5 @@ def contact_stream(arm: ArmCell, seed: int) -> tuple[Stream, list[Touching]]:
 
 
 def last_s(touches: list[Touching]) -> float:
-    """Return when the last contact can no more be judged [s]."""
+    """Return the time after which no alarm counts for the last contact [s]."""
     return touches[-1].end + float(scenario("contacts")["judged"]["late_s"]) + 0.1

@@ -1,4 +1,4 @@
-"""Profiles that benchmarks compare, by short names; and each switch of `pretouch` off alone: what it is worth."""
+"""Profiles that benchmarks compare, by short names, and ablations: `pretouch` with one switch off at a time."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -14,7 +14,7 @@ from pretouch.types import FloatArray
 Sweep = Literal["f_base_n", "scale"]
 BASE = "pretouch"
 WITHOUT = "without "
-"""Begins the names of these baselines."""
+"""Prefix of the names of ablations."""
 
 OFF = {
     "perception.self_aside_m": "0",
@@ -46,18 +46,18 @@ OFF = {
     "react.static_friction_nm": "0",
     "react.lag_s": "0",
 }
-"""What each switch of `pretouch` is when it is off, as `PATH`: the paper's value, or the part without effect."""
+"""Value of each switch of `pretouch`, by its path in the profile, when it is off: the paper's value, or no effect."""
 
 _DETECTION = ("window", "detect")
-"""Parts of the profile that streams show."""
+"""Parts of the profile whose effect streams show."""
 _UNSHOWN = ("window.freeze_while_reacting", "detect.touch")
-"""But these: no arm reacts in a stream, and none has touch sensors."""
+"""Exceptions: no arm in a stream reacts or has touch sensors."""
 
 
 def ablations(*, of_detection: bool) -> dict[str, str]:
-    """Return the profile of `pretouch` with one switch off, by the name of that contender.
+    """Return the profile of `pretouch` with one switch off, by the contender's name.
 
-    Either the switches of detection, which streams show, or all others, which need the closed loop.
+    They are the switches of detection, whose effect streams show, or the others, which need the closed loop.
     """
     return {
         f"{WITHOUT}{switch}": f"{BASE}:{switch}={value}"
@@ -76,16 +76,16 @@ AVOIDANCE = {
     "paper-off": "paper:approach=none",
     "pretouch": "pretouch",
 }
-"""Profile of each baseline: the published methods as published, and with another tuning."""
+"""Profile of each baseline: published methods with their published tuning, and with another one."""
 ABLATED = ablations(of_detection=False)
-"""Profile of `pretouch` with each switch off alone."""
+"""Profiles of `pretouch` with one switch off each, by name."""
 ABLATED_IN = ("circle +y", "line -y", "person +y")
-"""Scenarios in which those are played too, in a full run with `ABLATED_SEEDS` seeds each."""
+"""Scenarios that also play the ablations, with `ABLATED_SEEDS` seeds each in a full run."""
 ABLATED_SEEDS = 4
 
 
 def profile_text(baseline: str) -> str:
-    """Return the profile a baseline stands for; other than by its name it may be given as the profile itself."""
+    """Return the profile of a baseline's name; a profile's own text is returned unchanged."""
     text = {**AVOIDANCE, **ABLATED}.get(baseline, baseline)
     try:
         profile(text)
@@ -96,33 +96,33 @@ def profile_text(baseline: str) -> str:
 
 @dataclass(frozen=True)
 class Contender:
-    """A detector by name, and what is swept of it."""
+    """A detector by name, and its swept parameter."""
 
     name: str
     profile_text: str
     """As `pretouch.profiles.profile` reads it."""
     sweep: Sweep
-    """Base force of the paper's thresholds [N], or a factor on the evidence that makes an alarm."""
+    """Base force of the paper's thresholds [N], or a factor on the evidence for an alarm."""
 
     @property
     def profile(self) -> Profile:
-        """Return its parameters."""
+        """Parameters of the detector's profile."""
         return profile(self.profile_text)
 
-    def statistic(self, found: Detection, filtered: FloatArray, wrench: FloatArray | None) -> float:
-        """Return the largest value of the sweep at which a step would still be an alarm; -inf where none would.
+    def statistic(self, detection: Detection, filtered: FloatArray, wrench: FloatArray | None) -> float:
+        """Return the largest value of the sweep at which a step is still an alarm; -inf if no value makes it one.
 
-        With the paper's thresholds that is exact: neither window, F_sigma nor F_obs depends on F_b. Other detectors say
-        how much evidence they have; held against a factor that is exact as long as nothing they remember depends on
-        their own alarms.
+        This is exact for the paper's thresholds: window, F_sigma and F_obs do not depend on F_b. Other detectors return
+        their evidence. Comparing it with a factor is exact as long as no state of the detector depends on its own
+        alarms.
         """
-        if not found.armed:
+        if not detection.armed:
             return -np.inf
         if self.sweep == "scale":
-            return found.evidence
+            return detection.evidence
         if wrench is None:
             return -np.inf
-        limits = found.thresholds
+        limits = detection.thresholds
         params = MovingThresholds.of_kind(self.profile.detect)
         force = filtered if params.compare == "filtered" else wrench[:3]
         return float(np.max(np.maximum(force - limits.upper, limits.lower - force))) + params.f_base_n
@@ -136,11 +136,11 @@ DETECTORS = (
     Contender("paper-raw", "paper:detect.compare=raw", "f_base_n"),
     Contender("pretouch", "pretouch", "scale"),
 )
-"""The detectors; `pretouch` last."""
+"""Detectors of the benchmark; `pretouch` is the last one."""
 
 
 def ablated() -> tuple[Contender, ...]:
-    """Return `pretouch` with each switch of its detection off alone; the paper's thresholds are swept by F_b."""
+    """Return `pretouch` with one switch of its detection off at a time; F_b sweeps the paper's thresholds."""
     return tuple(
         Contender(name, text, "f_base_n" if name == f"{WITHOUT}detect" else "scale")
         for name, text in ablations(of_detection=True).items()

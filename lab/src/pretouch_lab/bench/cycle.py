@@ -1,4 +1,4 @@
-"""What one control step costs: processor and wall time at a rate."""
+"""Processor and wall time of a control step at a rate."""
 
 import os
 import platform
@@ -27,24 +27,24 @@ from pretouch_lab.run import Row
 from pretouch_lab.table import Column, table
 
 _SETTLE = 500
-"""Cycles after the force window is full in which the arm gets up to speed."""
+"""Cycles after the force window is full, in which the arm accelerates."""
 _SHORTER = 5000
-"""Most cycles in which every reading is new."""
+"""Largest number of cycles in which every reading is new."""
 _MOST_CYCLES = 10_000_000
 _SLOWEST, _FASTEST = 20.0, 10_000.0
-"""[Hz]: slower, each step would be late; faster than the shortest control period there may be."""
+"""Lowest and highest rate [Hz]: below, every step counts as late; above, the control period is too short."""
 _PACKAGES = ("pretouch", "numpy", "numba", "mujoco-core")
 
 
 @dataclass(frozen=True)
 class CycleRequest:
-    """How to measure."""
+    """Parameters of a measurement."""
 
     rate_hz: float = 1000.0
     cycles: int = 20_000
-    """Measured steps."""
+    """Number of measured steps."""
     profile: str = "paper"
-    """Profile, in which everything counted in cycles is brought to the rate."""
+    """Profile; its numbers of cycles are scaled to the rate."""
     priority: int | None = None
     cpu: int | None = None
     """See `pretouch.realtime.real_time`."""
@@ -66,11 +66,11 @@ class CycleRequest:
 
 
 def measure(points: int, request: CycleRequest, tell: Callable[[str], None] = lambda sentence: None) -> Row:
-    """Time the control step with a skin of that many points: a row of `pretouch bench cycle`.
+    """Time the control step with a skin of `points` units: a row of `pretouch bench cycle`.
 
-    Three runs are timed from outside: steps back to back, the same with every reading new in every cycle, and steps at
-    the ticks of a clock, between which the processor sleeps and its caches cool. `tell` is given what real time
-    could not be had.
+    Three runs are timed: steps back to back, the same with every reading new in every cycle, and steps at the ticks of
+    a clock, between which the processor sleeps and its caches cool. `tell` receives a sentence for each real-time
+    setting that the system refused.
     """
     model, params = RobotModel(robot_named(request.arm)), request.at_rate()
     work, hard, paced = (Workload(model, points, params, 0, new) for new in (False, True, False))
@@ -99,23 +99,23 @@ def measure(points: int, request: CycleRequest, tell: Callable[[str], None] = la
 
 
 class _Timed(NamedTuple):
-    """What a run came to."""
+    """Times of one run."""
 
     cpu: IntArray
     """(cycles,) processor time of each step [ns], all threads."""
     wall: IntArray
-    """(cycles,) [ns]"""
+    """(cycles,) wall time of each step [ns]."""
     restricting: IntArray
-    """(cycles,) points that restrict."""
+    """(cycles,) number of points that restrict the motion."""
     tracking: IntArray
-    """(cycles,) 1 where the arm follows its path."""
+    """(cycles,) 1 while the arm follows its path, else 0."""
     gained: int
-    """Memory that the process has at the end and did not have before the first step [B]."""
+    """Growth of the process's memory during the run [B]."""
 
 
 def _timed(controller: Controller, work: Workload, cycles: int, clock: MonotonicClock | None = None) -> _Timed:
     """Time each step once the arm moves, at the ticks of a clock or back to back."""
-    # filled: pages that are first written to in the run would count as gained
+    # filled, so that pages first written in the run do not count as growth
     cpu, wall, restricting, tracking = np.full((4, cycles), 0)
     state = controller.init(work.inputs().robot)
     for i in range(-controller.profile.window.samples - _SETTLE, cycles):
@@ -145,7 +145,7 @@ def _spread(took: IntArray) -> dict[str, float]:
 
 
 def about(request: CycleRequest) -> Row:
-    """Say where and how was measured, for the file of the results."""
+    """Return machine, versions and parameters of the measurement, for the file of the results."""
     return {
         **asdict(request),
         "readings_hz": UNIT_RATE,
@@ -158,7 +158,7 @@ def about(request: CycleRequest) -> Row:
 
 
 def processor() -> str:
-    """Name the processor of this machine."""
+    """Return the name of this machine's processor."""
     lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return models[0] if models else platform.machine()
@@ -177,7 +177,7 @@ _COLUMNS = (
 
 
 def tables(rows: list[Row], request: CycleRequest) -> list[TextTable]:
-    """Show what steps took, four runs for each number of points."""
+    """Return a table of step times, four lines for each number of points."""
     runs = {"CPU": "", "CPU, all new": "all_new_"}
     runs |= {f"CPU at {request.rate_hz:g} Hz": "at_rate_", f"wall at {request.rate_hz:g} Hz": "wall_"}
     lines: list[Row] = [
@@ -194,9 +194,9 @@ def tables(rows: list[Row], request: CycleRequest) -> list[TextTable]:
     gained = ", ".join(f"{row['memory_gained_kib']} KiB with {row['points']}" for row in rows)
     idle = [str(row["points"]) for row in rows if row["tracking"] < 1]
     note = (
-        "CPU: steps back to back, a reading of each unit 50 times a second; all new: every reading in every step; at a"
-        " rate: the processor sleeps between steps, and its caches cool. Overruns: steps that took longer than the"
-        " period. Restricting: points within reach of eq. 7, median. Memory gained in the run at"
+        "CPU: steps back to back, with 50 readings of each unit a second. All new: every reading is new in every step."
+        " At a rate: the processor sleeps between steps, and its caches cool. Overruns: steps longer than the period."
+        " Restricting: median number of points within reach of eq. 7. Growth of memory in the run at"
         f" {request.rate_hz:g} Hz: {gained}."
     )
     if idle:

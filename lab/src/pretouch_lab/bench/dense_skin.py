@@ -1,4 +1,4 @@
-"""Units spread over the arm. 32 of them are the skin of most scenarios, kept as `scenarios/dense_skin.toml`."""
+"""Units spread over the arm. Most scenarios use 32 of them, stored as `scenarios/dense_skin.toml`."""
 
 from itertools import product
 
@@ -12,15 +12,15 @@ from pretouch.sensing.unit import SensorUnit
 from pretouch.types import FloatArray
 
 UNITS = {"link2": 3, "link3": 5, "link4": 5, "link5": 7, "link6": 4, "link7": 2, "hand": 6}
-"""Units on each link, of 32."""
+"""Units on each link of a skin of 32."""
 _FIRST = tuple(reversed(UNITS))
-"""Links in the order in which each gets its first unit: from what is likeliest to touch something."""
+"""Links in the order in which each gets its first unit: those likeliest to touch something first."""
 _HEIGHT_M = 0.008
 """Height of a range finder above the surface [m]."""
 _CLEAR_M = (0.05, 0.1, 0.2, 0.3)
-"""Places along a beam [m] that have to lie outside the rest of the arm, in the ready posture."""
+"""Distances along a beam [m] that must lie outside the rest of the arm, in the ready posture."""
 _TURNS, _PARTS = 2 * np.pi * np.arange(24) / 24, np.linspace(0.0, 1.0, 7)
-"""Of places on a capsule: round its axis [rad], and along it."""
+"""Candidate places on a capsule: angles round its axis [rad], and fractions of its length."""
 
 
 def surface(a: FloatArray, b: FloatArray, turn: float, part: float) -> tuple[FloatArray, FloatArray]:
@@ -37,10 +37,10 @@ def gap(points: FloatArray, a: FloatArray, b: FloatArray, radius: FloatArray) ->
 
 
 def units_of(count: int) -> dict[str, int]:
-    """How many of so many units sit on each link: one on each first, then in proportion to `UNITS`.
+    """Return the number of units on each link of `count` units: first one on each, then in proportion to `UNITS`.
 
-    More units are always those of fewer and others. Shares are Webster's: the next unit goes where UNITS / (2 n + 1) is
-    largest for the n that are there, so that 32 units are `UNITS` itself.
+    A larger skin contains every smaller one. Shares are Webster's: the next unit goes to the link with the largest
+    UNITS / (2 n + 1), where n is its number of units, so that 32 units are `UNITS`.
     """
     counts = dict.fromkeys(UNITS, 0)
     for number in range(count):
@@ -50,9 +50,9 @@ def units_of(count: int) -> dict[str, int]:
 
 
 def spread_skin(model: RobotModel, count: int) -> Skin:
-    """Spread units over the links of a Panda, on each as far from each other as they can be, each looking off the arm.
+    """Spread units over the links of a Panda, as far apart on each link as possible, each facing away from the arm.
 
-    Raises ExperimentError for no unit, and for more than there are places.
+    Raises ExperimentError for less than one unit, and for more units than places.
     """
     if count < 1:
         raise ExperimentError(f"The number of units is {count}: give at least 1, or a profile without proximity.")
@@ -62,10 +62,10 @@ def spread_skin(model: RobotModel, count: int) -> Skin:
         places, normals = _candidates(model, link)
         if number_there > len(places):
             raise ExperimentError(
-                f"Of {count} units {number_there} would sit on {name}, where {len(places)} find a place: give fewer."
+                f"{number_there} of {count} units belong on {name}, which has {len(places)} places: give fewer units."
             )
         chosen = [int(np.argmax(places[:, 2]))]
-        while len(chosen) < number_there:  # the farthest from those before
+        while len(chosen) < number_there:  # the place farthest from the chosen ones
             chosen.append(int(np.argmax(np.linalg.norm(places[:, None] - places[chosen], axis=2).min(axis=1))))
         for number, i in enumerate(chosen[:number_there]):
             z, T = normals[i], np.eye(4)

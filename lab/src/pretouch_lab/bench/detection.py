@@ -1,6 +1,6 @@
-"""Contact detectors held against each other: each is given the same arms, simulated once, and its alarms are judged.
+"""Contact detectors compared on the same streams: each arm is simulated once, and every detector replays it.
 
-In free motion alarms are counted; on arms that are touched they are matched with the contacts that caused them.
+Alarms in free motion are counted. Alarms on touched arms are matched with the contacts that caused them.
 """
 
 from collections import Counter
@@ -23,16 +23,16 @@ from pretouch_lab.table import rounded
 
 FAMILIES = ("free", "contacts", "hard")
 ABLATED_ARMS = 2
-"""Arms of each path and neighbour in free motion that ablations are given."""
+"""Number of arms in free motion, for each path and bystander, that ablations replay."""
 BUSY = -1.0
-"""In place of a delay: an earlier alarm was still being answered when the contact began."""
+"""Value in place of a delay: the contact began during the reaction to an earlier alarm."""
 Match = tuple[float | None, int | None]
-"""Delay [s] of the first alarm a contact caused, and the step of that alarm: (None, None) of a missed contact, (BUSY,
-None) where an earlier alarm was still being answered."""
+"""Delay [s] and step of the first alarm of a contact: (None, None) for a missed contact, (BUSY, None) for a contact
+during the reaction to an earlier alarm."""
 
 
 def plays(seeds: SeedRange, quick: bool, world: str = "") -> list[Play]:
-    """Return the arms to play, the long ones of contacts first; with another world than their own none are hard."""
+    """Return the arms to play, long ones first. A `world` leaves out the hard arms, which have their own."""
     hard = [] if world else _hard(seeds, quick)
     arms = [*hard, *_contacts(seeds, quick, world), *_free(seeds, quick, world)]
     return [(asdict(arm), seed) for arm, seed in arms]
@@ -73,16 +73,16 @@ def _hard(seeds: SeedRange, quick: bool) -> Iterator[tuple[ArmCell, int]]:
 
 
 def trial(cell: Cell, seed: int) -> Row:
-    """Simulate an arm, and give what it said to one detector after the other."""
+    """Simulate an arm, and replay its stream to one detector after the other."""
     arm = ArmCell(**cell)
     stream, touches = streamed(arm, seed)
     steps = Steps(stream, model())
 
-    def judged(contender: Contender) -> Row:
+    def judge(contender: Contender) -> Row:
         return judged_contacts(steps, touches, contender) if touches else judged_free(steps, contender)
 
     contenders = (*DETECTORS, *ablated()) if arm.ablated else DETECTORS
-    return {"detectors": [{"contender": one.name, **judged(one)} for one in contenders]}
+    return {"detectors": [{"contender": one.name, **judge(one)} for one in contenders]}
 
 
 def rows_of(played: list[Row]) -> list[Row]:
@@ -92,19 +92,19 @@ def rows_of(played: list[Row]) -> list[Row]:
 
 
 def streamed(arm: ArmCell, seed: int) -> tuple[Stream, list[Touching]]:
-    """Let an arm run, and return its stream and its contacts, none where it is not touched."""
+    """Simulate an arm; return its stream and its contacts, none in free motion."""
     if arm.family == "free":
         return free_stream(arm, seed), []
     return contact_stream(arm, seed) if arm.family == "contacts" else hard_stream(arm, seed)
 
 
 def sweep_values(contender: Contender) -> list[float]:
-    """Return the values at which a contender's swept parameter is looked at."""
+    """Return the values of a contender's swept parameter."""
     return [float(value) for value in scenario("free")["curve"][contender.sweep]]
 
 
 def judged_free(steps: Steps, contender: Contender) -> Row:
-    """Count a detector's alarms in free motion after the warm-up, as it is and at each value of its sweep."""
+    """Count a detector's alarms after the warm-up, with its own parameter and each value of its sweep."""
     replayed, counted = alarms_of(steps, contender), steps.stream.stamp >= warm_up_s()
     onsets = [replayed.onsets(value) for value in (None, *sweep_values(contender))]
     alarms, *swept = (int(counted[at].sum()) for at in onsets)
@@ -112,7 +112,7 @@ def judged_free(steps: Steps, contender: Contender) -> Row:
 
 
 def judged_contacts(steps: Steps, touches: list[Touching], contender: Contender) -> Row:
-    """Match a detector's alarms with the contacts of a stream, as it is and at each value of its sweep."""
+    """Match a detector's alarms with contacts, with its own parameter and each value of its sweep."""
     stream, replayed = steps.stream, steps.replay(contender)
     matches = matched(touches, stream.stamp, replayed.onsets())
     swept = [matched(touches, stream.stamp, replayed.onsets(value)) for value in sweep_values(contender)]
@@ -130,19 +130,19 @@ def judged_contacts(steps: Steps, touches: list[Touching], contender: Contender)
 
 
 def matched(touches: list[Touching], stamp: FloatArray, onsets: list[int]) -> list[Match]:
-    """Match alarms, by the steps at which they begin, with contacts.
+    """Match alarms, by the steps of their onsets, with contacts.
 
-    A contact has the first alarm from its onset until some time after its end; both are in the scenario file.
+    A contact gets the first alarm between its onset and some time after its end, both defined in the scenario file.
     """
-    judged = scenario("contacts")["judged"]
+    rules = scenario("contacts")["judged"]
     at = stamp[onsets]
     matches: list[Match] = []
     for touch in touches:
-        onset = touch.onset(judged["onset_n"])
+        onset = touch.onset(rules["onset_n"])
         first = int(np.searchsorted(at, onset, side="right"))
         if first > 0 and at[first - 1] > onset - REST * PERIOD_S:
             matches.append((BUSY, None))
-        elif first < len(at) and at[first] <= touch.end + judged["late_s"]:
+        elif first < len(at) and at[first] <= touch.end + rules["late_s"]:
             matches.append((float(at[first]) - onset, onsets[first]))
         else:
             matches.append((None, None))
@@ -150,19 +150,19 @@ def matched(touches: list[Touching], stamp: FloatArray, onsets: list[int]) -> li
 
 
 def quiet_spread(stream: Stream, until: float) -> FloatArray:
-    """Standard deviation (n,) of each joint's external torque [Nm] in the second half of the time until an instant [s].
+    """Standard deviation (n,) of each joint's external torque [Nm] in the second half of the time before `until` [s].
 
-    That is the free motion of the very arm that is touched afterwards.
+    This is the free motion before the first contact of the same arm.
     """
     quiet = (stream.stamp >= 0.5 * until) & (stream.stamp < until)
     return np.asarray(stream.robot["tau_ext"][quiet].std(axis=0))
 
 
 def about(touch: Touching, stream: Stream, noise: FloatArray) -> dict[str, Any]:
-    """Say of a contact where and how it was, whether it was seen, and whether its torques stand out of the noise."""
+    """Return place, kind and force of a contact, and flags: seen by the skin, torques above the noise."""
     family = scenario("contacts")
-    judged, kinds = family["judged"], family["contact"]["kind"]
-    step = max(0, int(np.searchsorted(stream.stamp, touch.onset(judged["onset_n"]), side="right")) - 1)
+    rules, kinds = family["judged"], family["contact"]["kind"]
+    step = max(0, int(np.searchsorted(stream.stamp, touch.onset(rules["onset_n"]), side="right")) - 1)
     kin = model().kinematics(stream.robot["q"][step])
     rotation, origin = kin.rotation[touch.link], kin.position[touch.link]
     hand = origin + rotation @ (touch.point + touch.hand_radius * touch.normal)
@@ -174,8 +174,8 @@ def about(touch: Touching, stream: Stream, noise: FloatArray) -> dict[str, Any]:
         "kind": kinds[touch.kind]["name"],
         "force_n": touch.force_n,
         "duration_s": touch.duration_s,
-        "seen": bool(away <= judged["seen_m"]),
-        "detectable": bool(np.any(torque > judged["feelable_sigmas"] * noise)),
+        "seen": bool(away <= rules["seen_m"]),
+        "detectable": bool(np.any(torque > rules["feelable_sigmas"] * noise)),
     }
 
 
@@ -184,7 +184,7 @@ def _delay(match: Match) -> float | None:
 
 
 def towards(match: Match, touch: Touching, stream: Stream, replayed: Replayed) -> bool | None:
-    """Whether the touched point would begin to move against the force on it, towards the person."""
+    """Return True if the touched point would start to move against the force on it; None without an alarm."""
     if match[1] is None:
         return None
     moving = np.flatnonzero(np.isfinite(replayed.motion[match[1] : match[1] + REST, 0]))

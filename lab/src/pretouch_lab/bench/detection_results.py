@@ -1,6 +1,6 @@
-"""What all rows of the detection benchmark say together: rates with their bounds, delays, what was missed.
+"""Results of the detection benchmark over all rows: rates with their bounds, delays, missed contacts.
 
-A group of arms, or of contacts, is declared by the values that its rows share.
+A group of arms or of contacts is declared by the values that its rows share.
 """
 
 from collections.abc import Sequence
@@ -14,22 +14,22 @@ from pretouch_lab.run import Row
 from pretouch_lab.table import dispersion_of, median_bounds, rate_bounds, rounded
 
 GOAL_FREE, GOAL_CONTACTS = "free: goal", "contacts: goal"
-"""Scenarios of the goals: the usual arm at the goal's speed, whoever is near; contacts the goals of delay are set for,
-on the usual arm with the usual skin."""
+"""Scenarios of the goals: the nominal arm at the goal's speed, with any bystander; contacts with a goal of delay, on
+the nominal arm with the nominal skin."""
 ABLATED_FREE, ABLATED_CONTACTS = "free: ablations", "contacts: ablations"
-"""Of those, what ablations were given."""
+"""The parts of these scenarios that ablations replay."""
 HARD, HARD_CONTACTS, UNTOLD = "hard: all", "hard, touched: all", "untold-load"
-"""Scenarios of the goals on arms with the flaws of real ones, and the motion that is no part of it: its loads may give
-an alarm each."""
+"""Scenarios of the goals on hard arms, with the errors of real ones, and the motion outside them: each of its loads may
+cause an alarm."""
 Groups = dict[str, Row]
-"""Values that all rows of a group have, by the group's name."""
+"""Values that the rows of a group share, by the group's name."""
 _USUAL = {"arm": "nominal", "sensing": "nominal", "goal": True}
 _AT_GOAL = {"arm": "nominal", "pace": "goal"}
 _NEAR = {"nobody near": "nothing", "somebody standing": "standing", "somebody passing": "passing"}
 
 
 def results(rows: list[Row]) -> Row:
-    """Return what the numbers of the benchmark hold, of a row for each arm and detector."""
+    """Return the numbers of the benchmark from a row for each arm and detector."""
     free, touched, hard = (arms_of(rows, family) for family in FAMILIES)
     contacts = contacts_of(touched)
     return {
@@ -45,7 +45,7 @@ def results(rows: list[Row]) -> Row:
 
 
 def arms_of(rows: list[Row], family: str) -> list[Row]:
-    """Return the rows of a family, each with what tells groups apart: its arm, its pace, whether loads are told."""
+    """Return the rows of a family with the values that groups use: arm, pace, and `told` (loads are declared)."""
     goal = scenario("contacts")["goal"]["speed_m_s"]
 
     def apart(row: Row) -> Row:
@@ -56,7 +56,7 @@ def arms_of(rows: list[Row], family: str) -> list[Row]:
 
 
 def contacts_of(arms: list[Row]) -> list[Row]:
-    """Return the contacts of arms, each with its arm's values and whether the goals of delay are set for it."""
+    """Return the contacts of arms, each with its arm's values and `goal`, true for contacts with a goal of delay."""
     goal = scenario("contacts")["goal"]
 
     def is_clear(contact: Row) -> bool:
@@ -67,7 +67,7 @@ def contacts_of(arms: list[Row]) -> list[Row]:
 
 
 def group(rows: list[Row], where: Row) -> list[Row]:
-    """Return the rows that have some values."""
+    """Return the rows with the values of `where`."""
     return [row for row in rows if where.items() <= row.items()]
 
 
@@ -83,7 +83,7 @@ def free_groups() -> Groups:
 
 
 def contact_groups(contacts: list[Row]) -> Groups:
-    """Return groups of contacts, by name: of the goals by speed, of all by kind, and of other arms and skins."""
+    """Return groups of contacts, by name: goals by speed, all by kind, and other arms and skins."""
     speeds = sorted({contact["speed_m_s"] for contact in contacts})
     kinds = dict.fromkeys(contact["kind"] for contact in contacts)
     others = dict.fromkeys((contact["arm"], contact["sensing"]) for contact in contacts)
@@ -101,7 +101,7 @@ def contact_groups(contacts: list[Row]) -> Groups:
 
 
 def rate(counts: list[int], hours: float) -> Row:
-    """Return a rate [1/h] with 95 % bounds, of the counts of each arm: Poisson's, wider where arms differ."""
+    """Return a rate [1/h] with 95 % bounds from each arm's count: Poisson bounds, wider if arms differ."""
     low, high = rate_bounds(sum(counts), hours, dispersion_of(counts))
     return {
         "false_alarms_per_hour": rounded(sum(counts) / hours, 4),
@@ -113,21 +113,21 @@ def rate(counts: list[int], hours: float) -> Row:
 
 
 def delays(every: list[float | None]) -> Row:
-    """Summarise delays [s]: of what was detected; contacts that came while an alarm was answered are apart."""
-    judged = [value for value in every if value != BUSY]
-    at = [value for value in judged if value is not None]
+    """Summarise delays [s] of detected contacts; contacts during the reaction to an earlier alarm count as busy."""
+    countable = [value for value in every if value != BUSY]
+    at = [value for value in countable if value is not None]
     return {
         "median_delay_s": rounded(float(np.median(at)), 4) if at else None,
         "p95_delay_s": rounded(float(np.percentile(at, 95)), 4) if at else None,
         "median_bounds_s": [rounded(bound, 4) for bound in median_bounds(at)] if at else None,
-        "missed": len(judged) - len(at),
-        "contacts": len(judged),
-        "busy": len(every) - len(judged),
+        "missed": len(countable) - len(at),
+        "contacts": len(countable),
+        "busy": len(every) - len(countable),
     }
 
 
 def free_rows(arms: list[Row], contenders: Sequence[Contender], groups: Groups) -> list[Row]:
-    """Return the false alarms of each contender in each group of arms there are hours of."""
+    """Return the false alarms of each contender in each group of arms with free motion."""
     return [
         {"contender": contender.name, "scenario": name}
         | rate([row["alarms"] for row in some], sum(row["hours"] for row in some))
@@ -138,20 +138,20 @@ def free_rows(arms: list[Row], contenders: Sequence[Contender], groups: Groups) 
 
 
 def contact_rows(contacts: list[Row], contenders: Sequence[Contender], groups: Groups) -> list[Row]:
-    """Return delays and misses of each contender in each group of contacts, seen and not seen by the skin."""
+    """Return delays and missed contacts of each contender and group, for contacts seen and not seen by the skin."""
     return [
-        {"contender": contender.name, "scenario": name, "seen": seen}
+        {"contender": contender.name, "scenario": name, "seen": visible}
         | delays([contact["delay_s"] for contact in some])
         | {"towards": sum(bool(contact["towards"]) for contact in some)}
         for contender in contenders
         for name, where in groups.items()
-        for seen in (True, False)
-        if (some := group(contacts, where | {"contender": contender.name, "seen": seen}))
+        for visible in (True, False)
+        if (some := group(contacts, where | {"contender": contender.name, "seen": visible}))
     ]
 
 
 def hard_rows(arms: list[Row], contenders: Sequence[Contender]) -> list[Row]:
-    """Return false alarms, delays and misses of each contender on arms with the flaws of real ones, by motion."""
+    """Return false alarms, delays and missed contacts of each contender on hard arms, by motion."""
     groups: Groups = {
         HARD: {"told": True},
         **{f"{HARD}, {name}": {"told": True, "near": who} for name, who in _NEAR.items()},
@@ -163,7 +163,7 @@ def hard_rows(arms: list[Row], contenders: Sequence[Contender]) -> list[Row]:
 
 
 def ablation_rows(free: list[Row], touched: list[Row]) -> list[Row]:
-    """Return `pretouch` and its ablations on the arms that ablations are given."""
+    """Return the rows of `pretouch` and its ablations on the arms that ablations replay."""
     compared = (DETECTORS[-1], *ablated())
     arms, contacts = group(free, {"ablated": True}), contacts_of(group(touched, {"ablated": True}))
     return [
@@ -173,7 +173,7 @@ def ablation_rows(free: list[Row], touched: list[Row]) -> list[Row]:
 
 
 def curves(free: list[Row], contacts: list[Row]) -> list[Row]:
-    """Return delay against false alarms for the contacts and the free motion of the goals, value by value."""
+    """Return delays and false alarms in the scenarios of the goals, for each value of a sweep."""
     points = []
     for contender in DETECTORS:
         own = {"contender": contender.name}
@@ -183,18 +183,18 @@ def curves(free: list[Row], contacts: list[Row]) -> list[Row]:
             point: Row = (
                 own | {contender.sweep: value} | (rate([row["sweep"][k] for row in arms], hours) if hours else {})
             )
-            for seen, name in ((True, "seen"), (False, "unseen")):
-                point[name] = delays([contact["sweep_s"][k] for contact in group(touches, {"seen": seen})])
+            for visible, name in ((True, "seen"), (False, "unseen")):
+                point[name] = delays([contact["sweep_s"][k] for contact in group(touches, {"seen": visible})])
             points.append(point)
     return points
 
 
 def resolution(free: list[Row]) -> str:
-    """Say what a count of no false alarm would tell."""
+    """Return a sentence on the bound that a count of zero false alarms gives."""
     own = group(free, {"contender": DETECTORS[-1].name})
     every, most = (sum(row["hours"] for row in group(own, where)) for where in ({}, _AT_GOAL))
     if not most:
-        return "There is no free motion at the goal's speed: nothing can be said of false alarms."
+        return "There is no free motion at the goal's speed, and so no rate of false alarms."
     return (
         f"{every:.2g} h of free motion. No false alarm in the {most:.2g} h at the goal's speed means fewer than"
         f" {rate_bounds(0, most)[1]:.2g} an hour (95 %)."

@@ -1,4 +1,4 @@
-"""The detection benchmark as tables of finished text, for the terminal and the document."""
+"""Tables of the detection benchmark, for the terminal and the document."""
 
 from pretouch.text_table import TextTable
 from pretouch_lab.bench.contenders import BASE, WITHOUT
@@ -27,91 +27,86 @@ _TOWARDS, _REACHED = Column("towards\nperson", "towards"), Column("goals\nreache
 
 
 def tables(results: Row) -> list[TextTable]:
-    """Return all tables of what `results` of the JSON file says."""
+    """Return all tables of the `results` in the JSON file."""
     goal, rows = scenario("contacts")["goal"], results["rows"]
     names = list(dict.fromkeys(row["contender"] for row in rows))
     ablated = [name for name in names if name.startswith(WITHOUT)]
     whole = [name for name in names if name not in ablated]
     note = (
         f"Goals: at most {goal['false_alarms_per_hour']:g} false alarm an hour in free motion at"
-        f" {goal['speed_m_s']:g} m/s, with or without somebody near; median delay at most"
-        f" {1000 * goal['seen_delay_s']:g} ms for contacts the skin saw and {1000 * goal['unseen_delay_s']:g} ms for"
-        f" others, none missed, of those of {goal['force_n']:g} N and more lasting {1000 * goal['duration_s']:g} ms and"
-        " more on the links 3 to 7 and the hand, whose torques exceed three standard deviations of free motion's. Below"
-        " a rate: 95 % bounds. Delay: from the true force passing 1 N, of what was detected. Towards person: the"
-        " touched point would begin to move against the force on it, of all detected: none is the goal. Reached: as"
-        " measured here, whatever the bounds."
+        f" {goal['speed_m_s']:g} m/s, with or without a person near; a median delay of at most"
+        f" {1000 * goal['seen_delay_s']:g} ms for contacts that the skin saw and {1000 * goal['unseen_delay_s']:g} ms"
+        " for others; no missed contact. The contacts of the goals have at least"
+        f" {goal['force_n']:g} N for {1000 * goal['duration_s']:g} ms, are on the links 3 to 7 or the hand, and cause"
+        " torques above three standard deviations of free motion. Below a rate: 95 % bounds. Delay: from 1 N of true"
+        " force, of detected contacts. Towards person: the touched point would start to move against the force, of"
+        " detected contacts; the goal is none. Reached: by the measured value, whatever its bounds."
     )
-    judged, hard = (*_COLUMNS, _TOWARDS, _REACHED), (*_COLUMNS, _TOWARDS)  # hard arms have goals of their own
+    goal_columns, hard_columns = (*_COLUMNS, _TOWARDS, _REACHED), (*_COLUMNS, _TOWARDS)  # hard arms have own goals
     compared = [BASE, *ablated] if ablated else []
     every = [
-        table("Contact detection: the goals", judged, _judged(rows, whole, GOAL_FREE, GOAL_CONTACTS), note),
+        table("Contact detection: the goals", goal_columns, _judged(rows, whole, GOAL_FREE, GOAL_CONTACTS), note),
         _equal(results["curves"], whole),
         table(
-            "Each switch of pretouch's detection off alone",
-            judged,
+            "Pretouch with one switch of its detection off at a time",
+            goal_columns,
             _judged(rows, compared, ABLATED_FREE, ABLATED_CONTACTS),
-            f"{note} On a part of the streams: free motion of at most two arms of each path and neighbour, and the"
-            " contacts at the goal's speed; pretouch here has the same. Nothing reacts in them and no arm has touch"
-            " sensors, so that freeze_while_reacting and touch are not here.",
+            f"{note} Only a part of the streams: free motion of at most two arms for each path and bystander, and the"
+            " contacts at the goal's speed; pretouch has the same part here. No arm reacts or has touch sensors in a"
+            " stream, so freeze_while_reacting and touch are not in this table.",
         ),
         table(
-            "Arms with the flaws of real ones",
-            hard,
+            "Hard arms, with the errors of real ones",
+            hard_columns,
             _judged(rows, whole, HARD, HARD_CONTACTS),
-            f"{note} The world hard: friction that remembers, gears that shake, joints that ring, drift, cables,"
-            " delays; contacts whose torques exceed three standard deviations of that arm's free motion.",
+            f"{note} The world hard adds friction with memory, ripple of gears, ringing joints, drift, cables and"
+            " delays. Its contacts cause torques above three standard deviations of the same arm's free motion.",
         ),
     ]
     return [each for each in every if each.rows]
 
 
-def _texts(name: str, free: Row | None, seen: Row | None, unseen: Row | None) -> Row:
-    """What each column says of a detector."""
+def _texts(name: str, free: Row | None, visible: Row | None, hidden: Row | None) -> Row:
+    """Return the text of each column for a detector."""
     return {
         "detector": name,
         "rate": _rate(free),
-        "seen": _delay(seen),
-        "seen_missed": _missed(seen),
-        "unseen": _delay(unseen),
-        "unseen_missed": _missed(unseen),
+        "seen": _delay(visible),
+        "seen_missed": _missed(visible),
+        "unseen": _delay(hidden),
+        "unseen_missed": _missed(hidden),
     }
 
 
 def _judged(rows: list[Row], names: list[str], free: str, contacts: str) -> list[Row]:
-    """Return what the table of the goals says of each detector, in scenarios of free motion and of contacts."""
+    """Return a line of the table of goals for each detector, from scenarios of free motion and of contacts."""
     lines = []
     for name in names:
-        alarms, seen, unseen = (
-            find(rows, name, free),
-            find(rows, name, contacts, True),
-            find(rows, name, contacts, False),
-        )
-        there = [row for row in (seen, unseen) if row]
-        detected, against = (
-            sum(row["contacts"] - row["missed"] for row in there),
-            sum(row["towards"] for row in there),
-        )
-        judged = {"towards": f"{against}/{detected}", "reached": reached(alarms, seen, unseen)}
-        lines.append(_texts(name, alarms, seen, unseen) | judged)
+        alarms = find(rows, name, free)
+        visible, hidden = (find(rows, name, contacts, flag) for flag in (True, False))
+        both = [row for row in (visible, hidden) if row]
+        detected = sum(row["contacts"] - row["missed"] for row in both)
+        against = sum(row["towards"] for row in both)
+        verdict = {"towards": f"{against}/{detected}", "reached": reached(alarms, visible, hidden)}
+        lines.append(_texts(name, alarms, visible, hidden) | verdict)
     return lines
 
 
-def reached(free: Row | None, seen: Row | None, unseen: Row | None) -> str:
-    """Name the goals that a detector reached: its rate of false alarms, delays of what was seen or not, direction."""
+def reached(free: Row | None, visible: Row | None, hidden: Row | None) -> str:
+    """Name the goals that a detector reached: rate of false alarms, delays of contacts seen or not, direction."""
     goal = scenario("contacts")["goal"]
     names = ["rate"] if free and free["false_alarms_per_hour"] <= goal["false_alarms_per_hour"] else []
-    for name, row in (("seen", seen), ("unseen", unseen)):
+    for name, row in (("seen", visible), ("unseen", hidden)):
         if row and row["contacts"] and not row["missed"] and row["median_delay_s"] <= goal[f"{name}_delay_s"]:
             names.append(name)
-    there = [row for row in (seen, unseen) if row]
-    if there and not any(row["towards"] for row in there):
+    both = [row for row in (visible, hidden) if row]
+    if both and not any(row["towards"] for row in both):
         names.append("direction")
     return "\n".join(names) or "none"
 
 
 def _equal(curves: list[Row], names: list[str]) -> TextTable:
-    """Each detector with the value of its sweep at which it keeps the goal of false alarms, and what it has then."""
+    """Return a table of each detector at the first value of its sweep that reaches the goal of false alarms."""
     limit = scenario("contacts")["goal"]["false_alarms_per_hour"]
     quiet: dict[str, Row] = {}
     for point in curves:
@@ -123,12 +118,12 @@ def _equal(curves: list[Row], names: list[str]) -> TextTable:
         at = f"{point['f_base_n']:g} N" if "f_base_n" in point else f"x {point['scale']:g}" if point else "none"
         lines.append(_texts(name, point or None, point.get("seen"), point.get("unseen")) | {"at": at})
     return table(
-        "The same with as many false alarms as allowed",
+        "Detectors at equal rates of false alarms",
         (_COLUMNS[0], Column("at", "at"), *_COLUMNS[1:]),
         lines,
-        f"Each detector at the smallest value of its swept parameter at which it has at most {limit:g} false alarm an"
-        " hour: the base force F_b, or a factor on the evidence that makes an alarm. Chosen with hindsight on the same"
-        " streams, so it flatters all of them alike.",
+        f"Each detector at the smallest value of its swept parameter with at most {limit:g} false alarm an hour. The"
+        " parameter is the base force F_b, or a factor on the evidence for an alarm. The value is chosen on the same"
+        " streams, which favours all detectors alike.",
     )
 
 

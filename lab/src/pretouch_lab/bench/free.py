@@ -1,4 +1,4 @@
-"""Free motion: arms that nothing touches, some with somebody near (`scenarios/free.toml`)."""
+"""Free motion: arms without contact, some with a bystander (`scenarios/free.toml`)."""
 
 import numpy as np
 
@@ -7,18 +7,18 @@ from pretouch_lab.bench.scenes import ArmCell, path_of, plant_of, scenario, sens
 from pretouch_lab.bench.streams import AWAY, Alone, Prepare, Stream, record
 
 _HAND_SIDE_M = 0.102
-"""How far the arm's hand reaches out to the side of its origin [m]."""
+"""Extent of the arm's hand to the side of its origin [m]."""
 _HAND_FRONT_M = 0.13
-"""How far hand and wrist reach out to the front [m]."""
+"""Extent of hand and wrist to the front [m]."""
 
 
 def warm_up_s() -> float:
-    """Return the time in which no alarm counts [s]."""
+    """Return the time at the start in which no alarm counts [s]."""
     return float(scenario("free")["duration"]["warm_up_s"])
 
 
 def free_stream(arm: ArmCell, seed: int) -> Stream:
-    """Let an arm move that nothing touches, with its skin where somebody is near; return its stream."""
+    """Simulate an arm in free motion; it has a skin only if somebody is near."""
     what = Alone(
         path_of(arm.path), arm.speed_m_s, plant_of(arm.kind),
         None if arm.near == "nothing" else sensing_of(arm.sensing, seed), scenario("free")["near"]["radius_m"],
@@ -28,7 +28,7 @@ def free_stream(arm: ArmCell, seed: int) -> Stream:
 
 
 def _bystander(arm: ArmCell, seed: int) -> Prepare:
-    """Return what has somebody stand beside the path, or come and go there; the seed says where."""
+    """Return a function that places a bystander beside the path, standing or passing; the seed draws the place."""
     near, rng = scenario("free")["near"], np.random.default_rng([seed, 31])
     closest = rng.uniform(*near["gap_m"])
     side, off = rng.choice([-1.0, 1.0]), rng.uniform(-0.1, 0.1, 2)

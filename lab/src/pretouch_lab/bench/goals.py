@@ -1,4 +1,4 @@
-"""The goals set for `pretouch` before it was built, with what was reached; and the one table that says why."""
+"""The goals of `pretouch`, set before it was built, and their results; and the table of the first page."""
 
 from collections.abc import Callable, Iterator
 from textwrap import fill
@@ -14,39 +14,39 @@ PARTS = (
     ("true_peak_20ms_n", "blind", 4.0, "true 20 ms peak at least {:g} times smaller than of blind"),
     ("first_contact_s", "paper-off", 2.0, "first contact at least {:g} times sooner than paper-off"),
 )
-"""At boards: a measure, the reference, how many times smaller it is to be, and the goal."""
+"""Goals at boards: a measure, its reference, the least factor by which it must be smaller, and the goal as text."""
 SHORTER = 0.3
-"""Part by which a turn is to be shorter."""
+"""Least fraction by which a turn must be shorter."""
 _FRONT_NOTE = (
-    "Simulated, medians. The board has 25 N/mm, and units see it; its force is the highest for 20 ms. Pushes: the"
-    " contacts of the goals, of 15 N and more for 100 ms and more on the links 3 to 7 and the hand, whose torques"
-    " exceed three standard deviations of free motion's, on the usual arm with 32 units; seen by these or not. All"
-    " kinds: every contact of the benchmark, on all links, from 5 N and 30 ms on, of other arms and with impaired units"
-    " too. Left out are contacts that came while a false alarm was being answered. Nobody near: in an empty room. A"
-    " turn that did not end is >."
+    "Simulated, medians. The board has 25 N/mm and is in view of the units; its force is the highest 20 ms mean. Pushes"
+    " have at least 15 N for 100 ms, are on the links 3 to 7 or the hand, and cause torques above three standard"
+    " deviations of free motion; the arm is the nominal one with 32 units, which see the push or not. All kinds: every"
+    " contact of the benchmark, on all links, from 5 N and 30 ms on, also of other arms and with impaired units."
+    " Contacts during the reaction to a false alarm are left out. Nobody near: an empty room. > is a turn without an"
+    " end."
 )
 _WIDTH = 34
-"""Of a column [characters]."""
+"""Width of a column [characters]."""
 _DEFINED = (
-    "False alarms: the usual arm on circle and line at 0.3 m/s; bounds as Poisson's. Contacts: of 15 N and more for"
-    " 100 ms and more on the links 3 to 7 and the hand, whose torques exceed three standard deviations of free"
-    " motion's, on the usual arm and skin; delay from the true force passing 1 N, of what was detected; bounds of the"
-    " median from its ranks (of fewer than six values their range), of shares Clopper and Pearson's. Towards the"
-    " person: of all contacts, by the first motion of the touched point (redefined after the first published run), and"
-    " of all reactions in the closed loop; an answer that moves nothing is none. Boards: 25 N/mm, seen by units, circle"
-    " and line from both sides; median over the trials of the part of the reference's value in the same trial, where"
-    " without contact the force is 0 N and the time endless. First contact: from the board being within 0.8 m of the"
-    " end-effector. A turn: the second one. Forces beside the person: true 20 ms peak, 90 % of the trials below it."
+    "False alarms: the nominal arm on circle and line at 0.3 m/s, with Poisson bounds. Contacts have at least 15 N for"
+    " 100 ms, are on the links 3 to 7 or the hand, and cause torques above three standard deviations of free motion, on"
+    " the nominal arm and skin. Delays of detected contacts start at 1 N of true force. Bounds of the median are ranks,"
+    " below six values the range; bounds of shares are those of Clopper and Pearson. Towards the person: all contacts,"
+    " by the first motion of the touched point (redefined after the first published run), and all reactions in the"
+    " closed loop; a reaction without motion does not count. Boards: 25 N/mm, in view of the units, circle and line"
+    " from both sides; the median over the trials of the ratio to the reference in the same trial. Without contact the"
+    " force is 0 N and the time is infinite. First contact: time after the board came within 0.8 m of the end-effector."
+    " A turn: the second one. Forces beside the person: true 20 ms peak, 90th percentile of the trials."
 )
 Goal = tuple[str, bool | None, str, str]
-"""A goal, whether it was reached, what was measured, and 95 % bounds of that; None: nothing was measured."""
+"""A goal, True if it was reached, its measured value, and 95 % bounds; None: nothing was measured."""
 
 
 def goals(detection: Row, avoidance: Row) -> list[Goal]:
-    """Return the goals, given what the JSON files of both benchmarks hold."""
+    """Return the goals from the contents of the JSON files of both benchmarks."""
     return [
         *_false_alarms(detection["rows"]),
-        *(goal for seen in (True, False) for goal in _contacts(detection["rows"], seen)),
+        *(goal for visible in (True, False) for goal in _contacts(detection["rows"], visible)),
         _towards(detection["rows"], avoidance["rows"]),
         *(_board(pair(avoidance["paired"], "static", part[1], part[0]), *part[2:]) for part in PARTS),
         *(_turn(avoidance, reference) for reference in ("paper-off", "paper")),
@@ -64,18 +64,18 @@ def goal_table(detection: Row, avoidance: Row) -> TextTable:
         (fill(text, _WIDTH), verdict[reached], fill(measured, _WIDTH), bounds)
         for text, reached, measured, bounds in goals(detection, avoidance)
     )
-    note = f"{kinds}. Reached: the measured value reaches it, whatever its bounds. {_DEFINED}"
+    note = f"{kinds}. Reached: by the measured value, whatever its bounds. {_DEFINED}"
     return TextTable("The goals of pretouch", ("goal", "", "measured", "95 % bounds"), rows, note, 2)
 
 
-def find(rows: list[Row], baseline: str, name: str, seen: bool | None = None) -> Row | None:
-    """Return a baseline's row of a scenario, None if there is none."""
-    where = {"contender": baseline, "scenario": name} | ({} if seen is None else {"seen": seen})
+def find(rows: list[Row], baseline: str, name: str, visible: bool | None = None) -> Row | None:
+    """Return a baseline's row of a scenario, or None."""
+    where = {"contender": baseline, "scenario": name} | ({} if visible is None else {"seen": visible})
     return next((row for row in rows if where.items() <= row.items()), None)
 
 
 def pair(paired: list[Row], family: str, reference: str, measure: str) -> Row | None:
-    """Return how `BASE` compares with a reference, None if it was not measured."""
+    """Return the ratio of `BASE` to a reference for a measure, or None."""
     where = {"family": family, "contender": BASE, "reference": reference, "measure": measure}
     return next((row for row in paired if where.items() <= row.items()), None)
 
@@ -86,10 +86,9 @@ def _unmeasured(text: str) -> Goal:
 
 def _false_alarms(rows: list[Row]) -> Iterator[Goal]:
     limit = scenario("contacts")["goal"]["false_alarms_per_hour"]
-    near = {"": "all", ", nobody near": "nobody near", ", somebody standing": "somebody standing near",
-            ", somebody passing": "somebody passing"}  # fmt: skip
-    for name, who in near.items():
-        text, row = f"at most {limit:g} false alarm an hour at 0.3 m/s: {who}", find(rows, BASE, f"free: goal{name}")
+    for who in ("all", "nobody near", "somebody standing", "somebody passing"):
+        text = f"at most {limit:g} false alarm an hour at 0.3 m/s: {who}"
+        row = find(rows, BASE, "free: goal" + ("" if who == "all" else f", {who}"))
         if row is None:
             yield _unmeasured(text)
             continue
@@ -98,9 +97,9 @@ def _false_alarms(rows: list[Row]) -> Iterator[Goal]:
         yield text, row["false_alarms_per_hour"] <= limit, measured, f"{low} to {high}/h"
 
 
-def _contacts(rows: list[Row], seen: bool) -> list[Goal]:
-    word = "seen" if seen else "unseen"
-    limit, row = scenario("contacts")["goal"][f"{word}_delay_s"], find(rows, BASE, "contacts: goal", seen)
+def _contacts(rows: list[Row], visible: bool) -> list[Goal]:
+    word = "seen" if visible else "unseen"
+    limit, row = scenario("contacts")["goal"][f"{word}_delay_s"], find(rows, BASE, "contacts: goal", visible)
     delay, missed = f"median delay at most {1000 * limit:g} ms, {word} by the skin", f"none of those missed, {word}"
     if row is None or not row["contacts"]:
         return [_unmeasured(delay), _unmeasured(missed)]
@@ -119,7 +118,7 @@ def _at_most(events: int, of: int) -> str:
 
 def _towards(streams: list[Row], played: list[Row]) -> Goal:
     text, own = "never a reaction towards the person", [row for row in played if row["contender"] == BASE]
-    both = [row for seen in (True, False) if (row := find(streams, BASE, "contacts: all", seen))]
+    both = [row for visible in (True, False) if (row := find(streams, BASE, "contacts: all", visible))]
     against, of = sum(row["towards"] for row in both), sum(row["contacts"] - row["missed"] for row in both)
     moved, reactions = sum(row["towards_person"] for row in own), sum(row["reactions"] for row in own)
     if not of + reactions:
@@ -132,7 +131,7 @@ def _board(row: Row | None, times: float, text: str) -> Goal:
     if row is None:
         return _unmeasured(text.format(times))
     part, low, high = (
-        "0" if row[key] is None else f"{1 / row[key]:.3g}" if row[key] else "more than all"
+        "0" if row[key] is None else f"{1 / row[key]:.3g}" if row[key] else "infinitely many"
         for key in ("part", "low", "high")
     )
     reached = row["part"] is not None and row["part"] <= 1 / times
@@ -150,7 +149,7 @@ def _turn(avoidance: Row, reference: str) -> Goal:
     if row is None or not {BASE, reference} <= force.keys():
         return _unmeasured(text)
     shorter, high, low = (
-        "endlessly less" if row[key] is None else f"{100 * (1 - row[key]):.0f}" for key in ("part", "high", "low")
+        "infinitely less" if row[key] is None else f"{100 * (1 - row[key]):.0f}" for key in ("part", "high", "low")
     )
     reached = row["part"] is not None and row["part"] <= 1 - SHORTER and force[BASE] <= force[reference]
     measured = f"{shorter} % ({row['trials']} trials); {force[BASE]:.1f} N and {force[reference]:.1f} N"
@@ -158,12 +157,12 @@ def _turn(avoidance: Row, reference: str) -> Goal:
 
 
 def front_table(detection: Row, avoidance: Row) -> TextTable:
-    """Return the table of the first page: blind, paper and pretouch; what was not measured is a dash."""
+    """Return the table of the first page: blind, paper and pretouch; a dash stands for a missing measure."""
     cells = {(cell["family"], cell["contender"]): cell for cell in avoidance["families"]}
-    shown = [name for name in ("blind", "paper", BASE) if {("static", name), ("person", name)} <= cells.keys()]
+    names = [name for name in ("blind", "paper", BASE) if {("static", name), ("person", name)} <= cells.keys()]
 
     def contacts(name: str, which: str) -> list[Row]:
-        rows = (find(detection["rows"], name, f"contacts: {which}", seen) for seen in (True, False))
+        rows = (find(detection["rows"], name, f"contacts: {which}", visible) for visible in (True, False))
         return [row for row in rows if row is not None]
 
     def delay(name: str) -> str:
@@ -198,7 +197,7 @@ def front_table(detection: Row, avoidance: Row) -> TextTable:
         ("false alarms an hour,\nnobody near", alarms("nobody near")),
         ("the same, somebody\nstands near", alarms("somebody standing")),
     )
-    return tabulated("What happens when it touches something", columns, shown, _FRONT_NOTE, 1)
+    return tabulated("What happens when it touches something", columns, names, _FRONT_NOTE, 1)
 
 
 def _median(spread: Row | None) -> str:

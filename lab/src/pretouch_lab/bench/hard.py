@@ -1,4 +1,4 @@
-"""Arms with the flaws of real ones, in motions other than circle and line: free, or touched (`scenarios/hard.toml`)."""
+"""Hard arms, with the errors of real ones, in other motions than circle and line (`scenarios/hard.toml`)."""
 
 from collections.abc import Callable
 
@@ -17,16 +17,16 @@ from pretouch_lab.bench.streams import AWAY, PROFILE, Alone, Stream, record_move
 from pretouch_lab.replay import Place
 
 WORLD = "hard"
-"""Set of the domain randomisation of which each seed draws its arm."""
+"""Set of the domain randomisation that each seed draws its arm from."""
 _TRIES = 300
 _LOOKED_AT = 150
-"""Places of a bystander that are drawn, and postures of the motion that each is held against."""
+"""Numbers of drawn places for a bystander, and of postures of the motion to test each place against."""
 
 
 def hard_stream(arm: ArmCell, seed: int) -> tuple[Stream, list[Touching]]:
-    """Let an arm move; return its stream and its contacts, none where it is not touched.
+    """Simulate an arm; return its stream and its contacts, none in free motion.
 
-    With nobody near it has no units: the few readings that they would make of the arm itself are left out.
+    With nobody near the arm has no units: they would only read the arm itself.
     """
     family, sensing = scenario("hard"), sensing_of("nominal", seed)
     start = float(family["duration"]["warm_up_s"])
@@ -49,7 +49,7 @@ def hard_stream(arm: ArmCell, seed: int) -> tuple[Stream, list[Touching]]:
 
 
 def _gripping(plant: Plant, motion: LoadedMotion) -> Callable[[float], float]:
-    """Return what has the arm grip and put down its loads when it is time."""
+    """Return a function that grips and puts down the motion's loads at their times."""
     waiting = list(motion.loads)
 
     def grip(time: float) -> float:
@@ -61,28 +61,28 @@ def _gripping(plant: Plant, motion: LoadedMotion) -> Callable[[float], float]:
 
 
 def _beside(motion: LoadedMotion, seed: int) -> FloatArray:
-    """Draw a place (3,) [m] for somebody beside a motion: where none is as near as wanted, the best that was drawn."""
+    """Draw a place (3,) [m] for a bystander: the first within the range of distances, or else the nearest to it."""
     near, rng, body = scenario("hard")["near"], np.random.default_rng([seed, 62]), model().body
     times = np.linspace(0.0, float(motion.course.start[-1]), _LOOKED_AT)
     swept = [placed(body, model().kinematics(motion.course.at(time)[0])) for time in times]
     low, high = near["gap_m"]
-    best, found = np.inf, AWAY
+    smallest, best = np.inf, AWAY
     for _ in range(_TRIES):
         place = rng.uniform([-0.9, -0.9, 0.0], [0.9, 0.9, 1.2])
         least = min(float(gap(place[None], a, b, body.radius)[0]) for _, a, b, _ in swept) - near["radius_m"]
         off = max(low - least, least - high, 0.0)
-        if off < best:
-            best, found = off, place
+        if off < smallest:
+            smallest, best = off, place
         if not off:
             break
-    return found
+    return best
 
 
 def _touched(motion: LoadedMotion, number: int, seed: int) -> list[Touching]:
-    """Draw the contacts of an arm: the seed says where, how and when."""
+    """Draw the contacts of an arm: the seed decides places, forces and times."""
     family, rng, arm = scenario("hard"), np.random.default_rng([seed, 63]), model()
     chosen, hand = family["contact"], scenario("contacts")["hand"]
-    radius, at, found = sensing_of("nominal", seed).hand_radius, float(family["duration"]["warm_up_s"]), []
+    radius, at, touches = sensing_of("nominal", seed).hand_radius, float(family["duration"]["warm_up_s"]), []
     for _ in range(number):
         link = arm.link_index(f"{arm.description.name}_{chosen['links'][int(rng.integers(len(chosen['links'])))]}")
         point, normal = place_on(link, motion.course.at(at)[0], radius, rng, hand["from_m"])
@@ -91,10 +91,10 @@ def _touched(motion: LoadedMotion, number: int, seed: int) -> list[Touching]:
             link, _PUSH, float(rng.choice(chosen["forces_n"])), chosen["rise_s"],
             float(rng.choice(chosen["durations_s"])), at, point, normal, inwards / np.linalg.norm(inwards), radius,
         )  # fmt: skip
-        found.append(touch)
+        touches.append(touch)
         at = touch.end + rng.uniform(*chosen["gap_s"])
-    return found
+    return touches
 
 
 _PUSH = 1
-"""The kind of these contacts in contacts.toml."""
+"""Index of the contacts' kind in contacts.toml."""
