@@ -16,10 +16,8 @@ force[300:, 1] -= 14.0  # somebody pushes towards -y
 
 ee = np.array([0.5, 0.0, 0.3])
 arm = pt.RobotModel(pt.panda())
-hand = pt.closest_points(
-    arm.kinematics(arm.description.q_ready), arm.body, ee,
-    unit=np.array([0]), point=ee[None] + [[0.0, 0.2, 0.0]], last_direction=np.array([[0.0, 1.0, 0.0]]),
-)  # fmt: skip
+posture, unit, aside = arm.kinematics(arm.description.q_ready), np.array([0]), np.array([[0.0, 1.0, 0.0]])
+hand = pt.closest_points(posture, arm.body, ee, unit, point=ee + 0.2 * aside, last_direction=aside)
 
 for name, near in {"nothing near": pt.no_obstacles(), "a hand 0.2 m away at +y": hand}.items():
     detector, params, said = pt.MovingThresholds(), pt.WindowParams(), "no contact"

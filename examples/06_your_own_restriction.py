@@ -31,14 +31,18 @@ class Separation(Restriction, name="separation"):
     reach_s: float = 0.5
 
     def step(
-        self, state: Any, body: MotionBody, kin: Kinematics, robot: pt.RobotState, obstacles: pt.Obstacles,
+        self,
+        state: Any,
+        body: MotionBody,
+        kin: Kinematics,
+        robot: pt.RobotState,
+        near: pt.Obstacles,
         request: MotionRequest,
-    ) -> tuple[Restricted, Any]:  # fmt: skip
+    ) -> tuple[Restricted, Any]:
         """Return a row for each obstacle: how fast its closest point of the body approaches, and may."""
-        o, model = obstacles, body.model
-        near = zip(o.link, o.body_point, o.direction, strict=True)
-        rows = [direction @ model.jacobian(kin, int(link), point)[:3] for link, point, direction in near]
-        limit = np.maximum(o.body_distance - self.keep_m, 0.0) / self.reach_s
+        model, points = body.model, zip(near.link, near.body_point, near.direction, strict=True)
+        rows = [direction @ model.jacobian(kin, int(link), point)[:3] for link, point, direction in points]
+        limit = np.maximum(near.body_distance - self.keep_m, 0.0) / self.reach_s
         return Restricted(np.reshape(rows, (-1, model.n)), limit, np.arange(len(limit)), weight=1000.0), state
 
 

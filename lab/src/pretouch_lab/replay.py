@@ -15,7 +15,7 @@ from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.plant import Plant
-from pretouch.types import FloatArray, Mode, Obstacles, RobotState, TouchReadings
+from pretouch.types import FloatArray, Mode, Obstacles, RobotState
 
 _TRACK, _REACT = ModeState(Mode.TRACK, Event.CLEAR), ModeState(Mode.REACT, Event.REACTING)
 
@@ -26,20 +26,19 @@ class DetectorAlone:
     It keeps its own state and never reacts: the stream has the steps that follow an alarm.
     """
 
-    def __init__(self, profile: Profile, model: RobotModel, skin: Skin | None = None) -> None:
-        """Take the arm, and its skin if the detector reads touch sensors."""
-        self.body = Body(model, skin or Skin((), model), profile.task.control_period_s)
+    def __init__(self, profile: Profile, model: RobotModel) -> None:
+        """Take the arm; the detector reads no touch sensors."""
+        self.body = Body(model, Skin((), model), profile.task.control_period_s)
         self._detector, self._params = profile.detect, profile.window
         self.window, self.state = window_init(profile.window.samples), self._detector.init(self.body)
 
     def step(
-        self, kin: Kinematics, robot: RobotState, near: Obstacles, reacting: bool = False, watched: bool = True,
-        touches: TouchReadings | None = None,
-    ) -> Detection:  # fmt: skip
+        self, kin: Kinematics, robot: RobotState, near: Obstacles, reacting: bool = False, watched: bool = True
+    ) -> Detection:
         """Detect in one step; `reacting` and `watched` are flags of the arm and its skin in that step."""
         before, force = self.window, None if robot.wrench is None else robot.wrench[:3]
         window = add_force(before, force, self._params)
-        sample = Sample(robot.stamp, kin, robot, window, before.full, near, reacting, watched, touches)
+        sample = Sample(robot.stamp, kin, robot, window, before.full, near, reacting, watched)
         detection, self.state = self._detector.step(self.state, self.body, sample)
         self.window = before if reacting and self._params.freeze_while_reacting else window
         return detection

@@ -50,13 +50,12 @@ class Ding(Restriction, name="ding"):
             raise ParameterError(f"Ding.repulse_m, zero_low_m, zero_high_m, notice_m are {distances}: they must grow.")
 
     def step(
-        self, state: None, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
-        request: MotionRequest,
-    ) -> tuple[Restricted, None]:  # fmt: skip
+        self, state: None, body: MotionBody, kin: Kinematics, robot: RobotState, near: Obstacles, request: MotionRequest
+    ) -> tuple[Restricted, None]:
         """Return a row for each near point, and the row of the weighted sum."""
-        near = zip(obstacles.link, obstacles.body_point, obstacles.direction, strict=True)
-        rows = [d @ body.model.jacobian(kin, int(link), at)[:3] for link, at, d in near]
-        return self.within(np.reshape(rows, (-1, body.model.n)), obstacles.body_distance), None
+        points = zip(near.link, near.body_point, near.direction, strict=True)
+        rows = [d @ body.model.jacobian(kin, int(link), at)[:3] for link, at, d in points]
+        return self.within(np.reshape(rows, (-1, body.model.n)), near.body_distance), None
 
     def limit(self, distance: FloatArray) -> FloatArray:
         """Largest approach (K,) [m/s] at body distances (K,) [m], infinite from `notice_m` on; negative: a retreat.

@@ -37,14 +37,13 @@ class Flacco(Restriction, name="flacco"):
     0.1 is about half the width of the Panda's hand."""
 
     def step(
-        self, state: None, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
-        request: MotionRequest,
-    ) -> tuple[Restricted, None]:  # fmt: skip
+        self, state: None, body: MotionBody, kin: Kinematics, robot: RobotState, near: Obstacles, request: MotionRequest
+    ) -> tuple[Restricted, None]:
         """Return a velocity to add and limits of the joint velocities; there are no rows."""
-        model, near = body.model, zip(obstacles.link, obstacles.body_point, obstacles.direction, strict=True)
-        motion = [np.linalg.pinv(model.jacobian(kin, int(link), at)[:3]) @ d for link, at, d in near]
-        speeds = self.slowed(np.reshape(motion, (-1, model.n)), obstacles.body_distance, body.limits.qd_max)
-        velocity = self.velocity(kin.position[model.ee], obstacles)
+        model, points = body.model, zip(near.link, near.body_point, near.direction, strict=True)
+        motion = [np.linalg.pinv(model.jacobian(kin, int(link), at)[:3]) @ d for link, at, d in points]
+        speeds = self.slowed(np.reshape(motion, (-1, model.n)), near.body_distance, body.limits.qd_max)
+        velocity = self.velocity(kin.position[model.ee], near)
         rows = np.zeros((0, model.n)), np.zeros(0), np.zeros(0, WHOLE)
         return Restricted(*rows, weight=1.0, velocity=velocity, speeds=speeds), None
 

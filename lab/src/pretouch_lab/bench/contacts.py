@@ -162,10 +162,8 @@ def contact_stream(arm: ArmCell, seed: int) -> tuple[Stream, list[Touching]]:
     """Simulate an arm that is touched; return its stream and its contacts."""
     sensing = sensing_of(arm.sensing, seed)
     touches = plan(arm.count, sensing.hand_radius, seed)
-    what = Alone(
-        path_of("circle" if arm.speed_m_s > 0 else "rest"), arm.speed_m_s, plant_of(arm.kind), sensing,
-        sensing.hand_radius, seed, last_s(touches), arm.world,
-    )  # fmt: skip
+    path, plant = path_of("circle" if arm.speed_m_s > 0 else "rest"), plant_of(arm.kind)
+    what = Alone(path, arm.speed_m_s, plant, sensing, sensing.hand_radius, seed, last_s(touches), arm.world)
     return record(what, lambda plant: Toucher(plant, touches).hand), touches
 
 

@@ -19,11 +19,9 @@ def warm_up_s() -> float:
 
 def free_stream(arm: ArmCell, seed: int) -> Stream:
     """Simulate an arm in free motion; it has a skin only if somebody is near."""
-    what = Alone(
-        path_of(arm.path), arm.speed_m_s, plant_of(arm.kind),
-        None if arm.near == "nothing" else sensing_of(arm.sensing, seed), scenario("free")["near"]["radius_m"],
-        seed, warm_up_s() + arm.counted_s, arm.world,
-    )  # fmt: skip
+    sensing = None if arm.near == "nothing" else sensing_of(arm.sensing, seed)
+    path, plant, radius = path_of(arm.path), plant_of(arm.kind), scenario("free")["near"]["radius_m"]
+    what = Alone(path, arm.speed_m_s, plant, sensing, radius, seed, warm_up_s() + arm.counted_s, arm.world)
     return record(what, _bystander(arm, seed))
 
 

@@ -32,12 +32,10 @@ def hard_stream(arm: ArmCell, seed: int) -> tuple[Stream, list[Touching]]:
     start = float(family["duration"]["warm_up_s"])
     motion = motion_of(arm.path, seed, start + 2.0 * arm.counted_s)
     touches = _touched(motion, arm.count, seed)
-    what = Alone(
-        path_of("rest"), profile(PROFILE).task.speed_m_s, PlantParams(), None if arm.near == "nothing" else sensing,
-        sensing.hand_radius if touches else family["near"]["radius_m"], seed,
-        last_s(touches) if touches else start + arm.counted_s, WORLD,
-        motion.course.at(0.0)[0],
-    )  # fmt: skip
+    radius = sensing.hand_radius if touches else family["near"]["radius_m"]
+    end_s, speed = last_s(touches) if touches else start + arm.counted_s, profile(PROFILE).task.speed_m_s
+    units, q = None if arm.near == "nothing" else sensing, motion.course.at(0.0)[0]
+    what = Alone(path_of("rest"), speed, PlantParams(), units, radius, seed, end_s, WORLD, q)
 
     def prepare(plant: Plant) -> Place:
         plant.before_each_step(_gripping(plant, motion))
@@ -87,10 +85,9 @@ def _touched(motion: LoadedMotion, number: int, seed: int) -> list[Touching]:
         link = arm.link_index(f"{arm.description.name}_{chosen['links'][int(rng.integers(len(chosen['links'])))]}")
         point, normal = place_on(link, motion.course.at(at)[0], radius, rng, hand["from_m"])
         inwards = chosen["tilt"] * rng.uniform(-1, 1, 3) - normal
-        touch = Touching(
-            link, _PUSH, float(rng.choice(chosen["forces_n"])), chosen["rise_s"],
-            float(rng.choice(chosen["durations_s"])), at, point, normal, inwards / np.linalg.norm(inwards), radius,
-        )  # fmt: skip
+        inwards /= np.linalg.norm(inwards)
+        force, duration = float(rng.choice(chosen["forces_n"])), float(rng.choice(chosen["durations_s"]))
+        touch = Touching(link, _PUSH, force, chosen["rise_s"], duration, at, point, normal, inwards, radius)
         touches.append(touch)
         at = touch.end + rng.uniform(*chosen["gap_s"])
     return touches

@@ -1,7 +1,7 @@
-"""How far `pretouch identify` is off on simulated arms whose joints swing along sines, and whether intervals hold.
+"""Errors of `pretouch identify` on simulated arms whose joints swing along sines, and coverage of its intervals.
 
 python -m pretouch_lab.bench.identification          # eight arms of `realistic`, 60 s each
-python -m pretouch_lab.bench.identification rough    # with noise of encoders, late stamps and lost samples
+python -m pretouch_lab.bench.identification rough    # with encoder noise, late stamps and lost samples
 """
 
 import sys
@@ -25,7 +25,7 @@ from pretouch_lab.table import Column, summary, table
 SEEDS, SECONDS = range(1020, 1028), 60.0
 _PERIOD_S, _AMPLITUDE_RAD = 0.01, 0.4
 _RATE = 2 * np.pi * np.array([0.11, 0.13, 0.17, 0.19, 0.23, 0.29, 0.31])
-"""Of each joint's sine [rad/s]."""
+"""Angular frequency of each joint's sine [rad/s]."""
 _COLUMNS = (
     Column("number", "number"),
     Column("within 95 %", "within", of="trials"),
@@ -35,7 +35,7 @@ _COLUMNS = (
 
 
 def swung(seed: int) -> tuple[ArmSamples, Plant]:
-    """Swing the joints of an arm that the seed draws."""
+    """Swing the joints of an arm drawn by the seed; return its samples and the arm."""
     model = RobotModel(panda())
     plant = Plant(model, SceneSpec(), drawn(world_set("realistic"), seed).plant, model.description.q_ready, seed)
     rows = []
@@ -49,7 +49,7 @@ def swung(seed: int) -> tuple[ArmSamples, Plant]:
 
 
 def rough(samples: ArmSamples, seed: int) -> ArmSamples:
-    """Spoil samples by noise and steps of encoders, stamps late by up to 2 ms, lost samples, and gaps of 60 ms."""
+    """Add encoder noise and quantisation, delays of stamps up to 2 ms, lost samples, and gaps of 60 ms."""
     rng, count = np.random.default_rng(seed), len(samples.stamp)
     arrived = (rng.random(count) > 0.005) & (np.arange(count) % 500 > 5)
     q = 1e-5 * np.round((samples.q + 2e-5 * rng.standard_normal(samples.q.shape)) / 1e-5)
@@ -58,7 +58,7 @@ def rough(samples: ArmSamples, seed: int) -> ArmSamples:
 
 
 def trial(seed: int, roughly: bool = False) -> list[Row]:
-    """Identify an arm; a row for each number that the recording tells."""
+    """Identify an arm; return a row for each number that the recording determines."""
     samples, plant = swung(seed)
     arm = identify(rough(samples, seed) if roughly else samples, RobotModel(panda()), PlantParams())
     truth = plant.params
@@ -75,13 +75,13 @@ def trial(seed: int, roughly: bool = False) -> list[Row]:
     for quantity in arm.of_joints():
         if (right := true[quantity.field]) is not None:
             every = zip(quantity.values, quantity.standard_errors, np.asarray(right), strict=True)
-            numbers += [(quantity.name, *each) for each, told in zip(every, quantity.identified, strict=True) if told]
+            numbers += [(quantity.name, *each) for each, sure in zip(every, quantity.identified, strict=True) if sure]
     rows = [(name, abs(value - right), error) for name, value, error, right in numbers]
     return [{"number": n, "off": off, "sigmas": off / e, "within": bool(off < 1.96 * e)} for n, off, e in rows]
 
 
 def main(how: str = "") -> None:
-    """Identify all arms, and show how far the numbers are off."""
+    """Identify all arms, and print the errors of the numbers."""
     numbers = [row for seed in SEEDS for row in trial(seed, how == "rough")]
     rows = summary(numbers, ("number",), ("off", "sigmas"), ("within",))
     show(Console(), [table(f"Numbers of {len(SEEDS)} arms", _COLUMNS, rows)])

@@ -1,4 +1,4 @@
-"""Where contacts are said to be, held against where they are: on an arm that wanders, with skins and without."""
+"""Errors of contact localization on a wandering arm, with skins and without."""
 
 import time
 from collections import Counter
@@ -23,19 +23,19 @@ from pretouch_lab.table import Column, rounded, summary, table
 _TAIL_S = 0.6
 """Time after the last contact [s]."""
 SKINS = {"nominal": "32 units", "seven": "seven", "misplaced": "32 units, misplaced"}
-"""What the kinds of sensing are called."""
+"""Names of the kinds of sensing in tables."""
 WITHOUT = ("none", "none, nothing learnt")
-"""Skins of which there is no stream: that of 32 units is replayed as if it saw nothing. Free motion is learnt in the
-warm-up, in which somebody sees to it that nobody is near, or not at all."""
+"""Skins without a stream of their own: the stream of 32 units is replayed without its readings. The detector learns
+free motion in the warm-up, in which nobody is near, or never."""
 LINK_M = 0.1
-"""Standard deviation of a place on a link of which nothing is known but the link [m]."""
+"""Standard deviation of a contact's place on a link if only the link is certain [m]."""
 SAMPLES = 6
-"""Samples that a window has by the time a contact is judged: 100 ms less what the observer is late."""
+"""Samples in the window at the time of judgement: 100 ms less the observer's delay."""
 _STEP_M = 1e-4
 
 
 def plays(seeds: SeedRange, quick: bool) -> list[Play]:
-    """Return the arms to play, each with a skin; an arm has the same seed, and so the same contacts, with each."""
+    """Return the arms to play, each with a skin; an arm has the same seed and contacts with each skin."""
     family = scenario("localization")
     return [
         ({"sensing": sensing}, seed)
@@ -45,12 +45,12 @@ def plays(seeds: SeedRange, quick: bool) -> list[Play]:
 
 
 def planned(seed: int) -> tuple[Wandering, list[Touching]]:
-    """Draw an arm's motion and its contacts from a seed: with each skin they are the same."""
+    """Draw an arm's motion and contacts from a seed, the same for each skin."""
     family, rng = scenario("localization"), np.random.default_rng([seed, 42])
     course = wandering(seed, 2.0 * (family["duration"]["warm_up_s"] + 3.6 * family["contact"]["number"]))
     radius, touches = sensing_of("nominal", 0).hand_radius, list[Touching]()
     at, links = float(family["duration"]["warm_up_s"]), family["contact"]["links"]
-    for number in range(family["contact"]["number"]):  # links take turns, so that all are touched as often
+    for number in range(family["contact"]["number"]):  # in turn, so that all links have as many contacts
         name = links[number % len(links)]
         touches.append(touching(family["contact"], course.at(at)[0], at, radius, rng, name))
         at = touches[-1].end + rng.uniform(*family["duration"]["gap_s"])
@@ -75,7 +75,7 @@ def streamed(skin: str, seed: int) -> tuple[Stream, list[Touching]]:
 
 
 def trial(cell: Cell, seed: int) -> Row:
-    """Simulate an arm, and judge where the profile says its contacts are, with its skin and without any."""
+    """Simulate an arm, and measure the errors of localized contacts, with its skin and without any."""
     stream, touches = streamed(cell["sensing"], seed)
     skins = SKINS[cell["sensing"]], *(WITHOUT if cell["sensing"] == "nominal" else ())
     return {"skins": [{"skin": skin, **replayed(stream, touches, skin)} for skin in skins]}
@@ -87,9 +87,9 @@ def rows_of(played: list[Row]) -> list[Row]:
 
 
 def replayed(stream: Stream, touches: list[Touching], skin: str) -> Row:
-    """Give the profile each step of a stream as with the skin that is named, and judge where it says contacts are.
+    """Replay a stream with the named skin, and measure the errors of localized contacts.
 
-    Each contact is judged twice: some time after it began, and at its end, by the last step not later than that.
+    Each contact is judged twice, some time after its start and at its end, by the last step before.
     """
     params, arm, blind = profile("pretouch"), model(), skin in WITHOUT
     detector = DetectorAlone(params, arm)
@@ -114,13 +114,13 @@ def replayed(stream: Stream, touches: list[Touching], skin: str) -> Row:
 
 
 def judged_s(touch: Touching) -> float:
-    """Time after its start at which a contact is judged [s]: the scenario file's, or its end if that is earlier."""
+    """Time from the start of a contact to its judgement [s]: the scenario file's, but at most its duration."""
     return float(min(scenario("localization")["judged"]["after_s"], touch.duration_s))
 
 
 @cache
 def bodies() -> dict[int, str]:
-    """Name each rigid body by its last link, as `hand` for link 7, flange and hand."""
+    """Return the name of each rigid body, its last link: `hand` for link 7, flange and hand."""
     arm = model()
     links = scenario("localization")["contact"]["links"]
     return {int(arm.rigid[arm.link_index(f"{arm.description.name}_{name}")]): name for name in links}
@@ -132,9 +132,9 @@ def name_of(link: int) -> str:
 
 
 def judged(touch: Touching, touched: Touched, q: FloatArray, spread: FloatArray, when: str = "") -> Row:
-    """Hold the place that is reported in a posture (n,) [rad] against that of the contact.
+    """Compare the reported place in a posture (n,) [rad] with that of the contact.
 
-    `spread` is for `position_limit`, `when` ends the names of the values.
+    `spread` is for `position_limit`; `when` is a suffix of the measures' names.
     """
     rigid, kin, detected = model().rigid, model().kinematics(q), len(touched.link) > 0
     place = kin.position[touch.link] + kin.rotation[touch.link] @ touch.point
@@ -152,16 +152,16 @@ def judged(touch: Touching, touched: Touched, q: FloatArray, spread: FloatArray,
 def position_limit(touch: Touching, kin: Kinematics, q: FloatArray, spread: FloatArray) -> float:
     """Return the least standard deviation of a contact's place without a prior, both directions together [m].
 
-    It is the bound of Cramer and Rao. The unknowns are two coordinates on the surface and the force: into it, and in
-    two directions across. The noise is what free motion was learnt to be, of the mean of so many independent samples;
-    across the surface the force has the spread of `LocalisationParams`. What the torques do not tell at all is bounded
-    by the size of a link.
+    It is the bound of Cramer and Rao. The unknowns are two coordinates on the surface and three components of the
+    force. The noise is that of learnt free motion, for the mean of `SAMPLES` independent samples. Across the surface
+    the force has the spread of `LocalisationParams`. A direction without influence on the torques is
+    bounded by the size of a link.
 
     Args:
         touch: the contact.
         kin: the arm's posture.
         q: (n,) the same [rad].
-        spread: (2, 2, n) what was learnt of free motion, see `ResidualModel`.
+        spread: (2, 2, n) spread of learnt free motion, see `ResidualModel`.
     """
     p, d, arm = LocalisationParams(), SequentialParams(), model()
     M, moving = arm.mass_matrix(q), spread[1]
@@ -171,7 +171,7 @@ def position_limit(touch: Touching, kin: Kinematics, q: FloatArray, spread: Floa
     normal, force = R @ touch.normal, touch.force_n * (R @ touch.inwards)
     point = kin.position[touch.link] + R @ touch.point
     own = arm.capsules.of_links(np.array([touch.link]))
-    # along the axis of the capsule that the point lies on, and round it, where the force turns with the surface
+    # along the axis of the point's capsule, and round it, where the force turns with the surface
     off = np.abs(np.linalg.norm(from_axes(touch.point[None], own.a, own.b)[1][0], axis=1) - own.radius)
     axis = (own.b - own.a)[int(np.argmin(off))]
     along = R @ axis / np.linalg.norm(axis)
@@ -222,14 +222,14 @@ _COLUMNS = (
 
 def tables(rows: list[Row]) -> list[TextTable]:
     """Return the table of `results`."""
-    judged = scenario("localization")["judged"]
+    rules = scenario("localization")["judged"]
     rates = ", ".join(f"{skin} {rate:.0f} Hz" for skin, rate in {r["skin"]: r["rate_hz"] for r in rows}.items())
     named = [row | {"others": ", ".join(f"{k} {n}" for k, n in row["taken_for"].items()) or "-"} for row in rows]
     note = (
-        f"Judged {1000 * judged['after_s']:.0f} ms after the force began to rise, or at its end if that is earlier, and"
-        " once more at its end. Error: from the true place, both on the body in that posture, of what was detected,"
-        " whichever body it was taken for; what was not detected is not right. hand: link 7, flange and hand, which the"
-        " same joints move. Limit: what the torques alone could tell at best, the bound of Cramer and Rao, median. An"
-        f" inference takes so long that 99 of 100 would keep up with: {rates}."
+        f"Judged {1000 * rules['after_s']:.0f} ms after the start of the contact, or at its end if that is earlier, and"
+        " again at its end. Error: distance of the reported from the true place, for all detected contacts, right body or"
+        " not. A missed contact is not right. hand: link 7, flange and hand, which the same joints move. Limit:"
+        " least error from the torques alone (bound of Cramer and Rao), median. Rate at which 99 of 100 inferences end"
+        f" in time: {rates}."
     )
-    return [table("Where a contact is said to be", _COLUMNS, named, note, 2)]
+    return [table("Errors of localized contacts", _COLUMNS, named, note, 2)]

@@ -1,4 +1,4 @@
-"""Motions other than circle and line, as courses of the joints; and an arm that follows one, whatever touches it."""
+"""Motions other than circle and line, as courses of the joints that an arm follows whatever touches it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from pretouch_lab.bench.scenes import model, scenario
 
 _POSTURES = 4000
 _ALONG = 12
-"""Places looked at on the way from one posture to the next."""
+"""Number of postures to test between one posture and the next."""
 PEAK = 1.875
 """Largest speed of a quintic from rest to rest over its mean speed."""
 _PULL_1_S = 2.0
-"""Gain on what the arm is off its course [1/s]."""
+"""Gain on the arm's error from its course [1/s]."""
 _TRIES = 200
 _UP = np.array([0.0, 0.0, 1.0])
 Rng = np.random.Generator
@@ -26,14 +26,14 @@ Rng = np.random.Generator
 
 @dataclass(frozen=True)
 class Wandering:
-    """M ways from rest to rest, one after the other."""
+    """M moves from rest to rest, one after the other."""
 
     q: FloatArray
     """(M + 1, n) postures [rad]."""
     start: FloatArray
-    """(M,) when each way begins [s]."""
+    """(M,) start of each move [s]."""
     duration: FloatArray
-    """(M,) how long it takes [s]."""
+    """(M,) duration of each move [s]."""
 
     def at(self, time: float) -> tuple[FloatArray, FloatArray]:
         """Return joint positions (n,) [rad] and velocities (n,) [rad/s] at a time [s]."""
@@ -50,7 +50,7 @@ class Wandering:
 
 
 def posture(rng: np.random.Generator, before: FloatArray | None) -> FloatArray:
-    """Draw a posture (n,) that is free, as is the straight way to it; where none is found it is the one before."""
+    """Draw a posture (n,) with a free straight path to it; without such a posture, return the one before."""
     arm, part = model(), scenario("localization")["motion"]["range"]
     for _ in range(_POSTURES):
         q = np.asarray(arm.q_mid + part * (arm.q_max - arm.q_min) / 2 * rng.uniform(-1, 1, arm.n))
@@ -61,7 +61,7 @@ def posture(rng: np.random.Generator, before: FloatArray | None) -> FloatArray:
 
 
 def is_free(q: FloatArray) -> bool:
-    """Whether the arm is clear of the floor and of itself."""
+    """Return True if the arm is clear of the floor and of itself."""
     chosen, arm = scenario("localization")["motion"], model()
     body = arm.capsules
     _, a, b, _ = placed(body, arm.kinematics(q))
@@ -80,15 +80,15 @@ def is_free(q: FloatArray) -> bool:
 
 @dataclass(frozen=True)
 class LoadedMotion:
-    """What an arm does, and the loads that it grips and puts down meanwhile."""
+    """A course of the joints, with the loads that the arm grips and puts down."""
 
     course: Wandering
     loads: tuple[tuple[float, float], ...] = ()
-    """From each time on [s] what it carries [kg]."""
+    """Times [s] and the load from then on [kg]."""
 
 
 def motion_of(name: str, seed: int, until: float) -> LoadedMotion:
-    """Draw a motion of the scenario file by its name for so long [s]; the seed says which."""
+    """Draw a motion of the named kind until a time [s] from the seed."""
     rng = np.random.default_rng([seed, 61])
     if name in ("pick-and-place", "untold-load"):
         return _pick_and_place(scenario("hard")["motion"][name], rng, until)
@@ -96,16 +96,16 @@ def motion_of(name: str, seed: int, until: float) -> LoadedMotion:
 
 
 def wandering(seed: int, until: float) -> Wandering:
-    """Draw the motion of an arm that wanders, for so long [s]; the seed says which."""
+    """Draw the motion of a wandering arm until a time [s] from the seed."""
     return _course(scenario("localization")["motion"], _anywhere, np.random.default_rng([seed, 41]), until)
 
 
 Next = Callable[[FloatArray, dict[str, Any], Rng], list[FloatArray]]
-"""Gives the postures (n,) that come after one [rad]."""
+"""Returns the postures (n,) that follow one [rad]."""
 
 
 def _course(chosen: dict[str, Any], after: Next, rng: Rng, until: float) -> Wandering:
-    """String ways together until a time [s]."""
+    """Chain moves until a time [s]."""
     q, start, duration, at = [posture(rng, None)], [], [], 1.0
     while at < until:
         for target in after(q[-1], chosen, rng):
@@ -118,7 +118,7 @@ def _course(chosen: dict[str, Any], after: Next, rng: Rng, until: float) -> Wand
 
 
 _SHORTEST_S = 0.15
-"""Shortest way [s]: nobody jogs by less."""
+"""Shortest move [s], as in jogging."""
 
 
 def _anywhere(q: FloatArray, _chosen: dict[str, Any], rng: Rng) -> list[FloatArray]:
@@ -142,7 +142,7 @@ def _with_stops(q: FloatArray, chosen: dict[str, Any], rng: Rng) -> list[FloatAr
 
 
 def _free_of(q: FloatArray, draw: Callable[[], FloatArray]) -> FloatArray:
-    """Draw until a posture within the limits is free; where none is, go towards the ready one."""
+    """Draw until a posture is free and within the limits; without one, move towards the ready posture."""
     arm = model()
     for _ in range(_TRIES):
         target = draw()
@@ -152,13 +152,13 @@ def _free_of(q: FloatArray, draw: Callable[[], FloatArray]) -> FloatArray:
 
 
 _NEXT: dict[str, Next] = {
-    "random": _anywhere, "standing": _anywhere, "jogging": _one_joint, "stop-and-go": _with_stops,
-    "teleoperation": _a_little,
-}  # fmt: skip
+    **{"random": _anywhere, "standing": _anywhere, "jogging": _one_joint},
+    **{"stop-and-go": _with_stops, "teleoperation": _a_little},
+}
 
 
 def _pick_and_place(chosen: dict[str, Any], rng: Rng, until: float) -> LoadedMotion:
-    """Go to and fro between two places, take something at one and put it down at the other."""
+    """Return a motion to and fro between two places, with a load gripped at one and put down at the other."""
     hand, arm = model().ee, model()
     places = [
         np.array([rng.uniform(*chosen["x_m"]), side * rng.uniform(*chosen["y_m"]), rng.uniform(*chosen["z_m"])])

@@ -1,4 +1,4 @@
-"""Obstacles as surfaces, and how far from them the arm truly is: no sensor is asked."""
+"""Obstacles as surfaces, and their true distances from the arm, without any sensor."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,16 +12,16 @@ from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 
 _ALONG = np.linspace(0.0, 1.0, 51)[:, None, None]
-"""Places along a capsule's axis at which its distance is taken: exact to a fiftieth of its length."""
+"""Points along a capsule's axis that distances are computed at: exact to a fiftieth of its length."""
 
 
 class Nearest(NamedTuple):
-    """The true closest points of the arm and an obstacle."""
+    """True closest points of the arm and an obstacle."""
 
     distance: float
-    """Signed distance of the surfaces, negative where they meet [m]."""
+    """Signed distance of the surfaces, negative in contact [m]."""
     link: int
-    """Index of the link that is nearest."""
+    """Index of the nearest link."""
     point: FloatArray
     """(3,) closest point of the arm's surface [m]."""
     direction: FloatArray
@@ -37,12 +37,12 @@ class ObstacleShape(Protocol):
 
 
 ShapeAt = Callable[[FloatArray], ObstacleShape]
-"""An obstacle's surface, given where the person's hand is (..., 3) [m]."""
+"""Returns an obstacle's surface for positions (..., 3) of the person's hand [m]."""
 
 
 @dataclass(frozen=True)
 class Ball:
-    """A ball, or one at each of several instants."""
+    """A ball, or a ball at several instants."""
 
     center: FloatArray
     """(..., 3) [m]"""
@@ -94,7 +94,7 @@ def least_distance(model: RobotModel, q: FloatArray, shape: ShapeAt, hands: Floa
     ends = np.array([placed(body, model.kinematics(posture))[1:3] for posture in q])
     a, b = ends[:, 0], ends[:, 1]
     middle = shape(hands[:, None]).closest((a + b) / 2)[0] - body.radius
-    # no place on an axis is farther from its middle than half its length
+    # no point of an axis is farther from its middle than half its length
     s, c = np.nonzero(middle - np.linalg.norm(b - a, axis=2) / 2 <= middle.min())
     along = a[s, c] + _ALONG * (b - a)[s, c]
     return float((shape(hands[s]).closest(along)[0] - body.radius[c]).min())

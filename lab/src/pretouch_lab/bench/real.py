@@ -1,6 +1,6 @@
 """Contact detectors on public recordings of real arms: false alarms, contacts, delays, links.
 
-Each detector plays each set with its halves crosswise: one half learns, the other is judged.
+Each detector plays each set twice: it learns in one half of the runs and is tested in the other, then the halves swap.
 """
 
 from collections.abc import Sequence
@@ -21,29 +21,29 @@ from pretouch_lab.run import Cell, Row
 from pretouch_lab.table import Column, rate_bounds, table
 
 _AFTER_S = 0.1
-"""Time after a contact in which an alarm still counts as of it, and none as false [s]."""
+"""Time after a contact in which an alarm still belongs to it, and none is false [s]."""
 _NEAR_S = 0.5
-"""Contacts that part for less are one: so long nothing is a new alarm either [s]."""
+"""Shortest break between two contacts [s]; alarms within it are no new alarms either."""
 
 
 def halves(count: int) -> tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]:
-    """Return pairs of runs to learn from and runs to be judged, no run in both; each of them is judged once."""
+    """Return pairs of runs to learn from and runs to test, disjoint; each run is tested once."""
     even, odd = tuple(range(0, count, 2)), tuple(range(1, count, 2))
     return (even, odd), (odd, even)
 
 
 def trial(folder: Path, cell: Cell, _seed: int) -> Row:
-    """Play a detector on a set: what a row of each table says that the set has something for."""
+    """Play a detector on a set; return the values of each table that the set has runs for."""
     runs, whole = _prepared(folder, cell["set"])
     counts: dict[str, list[Row]] = {name: [] for name in TABLES}
     for learn, judge in halves(len(runs)):
-        # what is learnt in the first half by a detector that does so is kept, as from one session to the next
+        # a learning detector keeps the state of the first half, as from one session to the next
         stream = corrected(whole, learn).only((*learn, *judge))
         result, course = detect(stream.recording, profile(cell["detector"]))
         for name, some in counts.items():
-            judged = [number for number in judge if runs[number].touched is (name == "contacts")]
-            if judged:
-                some.append(tally(stream, result.contacts, course, judged, [run.joints for run in runs]))
+            numbers = [number for number in judge if runs[number].touched is (name == "contacts")]
+            if numbers:
+                some.append(tally(stream, result.contacts, course, numbers, [run.joints for run in runs]))
     return {name: total(some) for name, some in counts.items() if some}
 
 
@@ -55,7 +55,7 @@ def _prepared(folder: Path, name: str) -> tuple[list[RealRun], TorqueStream]:
 
 
 def parted(runs: list[RealRun]) -> list[RealRun]:
-    """Cut a single recording in the middle, so that there are two: nothing else could be judged apart."""
+    """Cut a single recording in the middle, so that there are two halves."""
     if len(runs) > 1:
         return runs
     (r,), middle = runs, len(runs[0].time) // 2
@@ -67,15 +67,15 @@ def tally(
     stream: TorqueStream,
     alarms: Sequence[DetectedContact],
     course: Course,
-    judged: Sequence[int],
+    runs: Sequence[int],
     joints: Sequence[tuple[int, ...]],
 ) -> Row:
-    """Count over some runs of a stream what `total` adds up; `joints` of each run of the set are as in `RealRun`.
+    """Count alarms and contacts in some runs of a stream, for `total`; `joints` are those of each run, see `RealRun`.
 
-    A contact is `busy` that began during an alarm of before: it is neither found nor missed. Links count of contacts
-    on a link that the set names, by a detector that names one.
+    A contact is `busy` if it began during an earlier alarm: it is neither found nor missed. Links count if the set
+    names the touched link and the detector names one.
     """
-    r, model, own = stream.recording, stream.recording.model, np.isin(stream.run, judged)
+    r, model, own = stream.recording, stream.recording.model, np.isin(stream.run, runs)
     at = np.searchsorted(r.time, course.time, side="right") - 1
     free = own[at] & course.judged & (np.abs(r.qd_commanded[at]).max(axis=1) > MOVING_RAD_S)
     delays_s: list[float] = []
@@ -107,7 +107,7 @@ def tally(
 
 
 def total(counts: Sequence[Row]) -> Row:
-    """Add up counts, with the rate of false alarms, its bounds and the median delay: None where there is none."""
+    """Add up counts; add the rate of false alarms, its bounds and the median delay, or None."""
     row: Row = {name: sum((count[name] for count in counts), start=type(counts[0][name])()) for name in counts[0]}
     hours, delays_s = row["motion_s"] / 3600.0, row.pop("delays_s")
     low, high = rate_bounds(row["false_alarms"], hours) if hours else (None, None)
@@ -121,7 +121,7 @@ def total(counts: Sequence[Row]) -> Row:
 
 
 def _spans(stream: TorqueStream) -> list[tuple[int, int, int]]:
-    """Stretches that are not sure to be free: first sample, first in a contact (-1: none), last sample."""
+    """Return spans that are not certainly free: first sample, first sample in a contact or -1, last sample."""
     label, time, run = stream.label, stream.recording.time, stream.run
     some = np.flatnonzero(label)
     apart = (np.diff(time[some]) > _NEAR_S) | (np.diff(run[some]) != 0)
@@ -153,14 +153,14 @@ TABLES = {
     "contacts": (
         "Real contacts",
         (*_COMMON, *_CONTACTS),
-        "Found of the labelled contacts; busy: began during an earlier alarm, and count in neither. Link: right of"
-        " those that set and detector name.",
+        "Found: of the labelled contacts. Busy: contacts that began during an earlier alarm; they do not count as found"
+        " or missed. Link right: of the links that both set and detector name.",
     ),
 }
 
 
 def tables(rows: Sequence[Row]) -> list[TextTable]:
-    """Write the rows, a table for each kind that there is."""
+    """Return a table of the rows for free motion, and one for contacts."""
     parts = {name: [{**row, **row[name]} for row in rows if name in row] for name in TABLES}
     return [
         table(title, columns, parts[name], note, 2) for name, (title, columns, note) in TABLES.items() if parts[name]

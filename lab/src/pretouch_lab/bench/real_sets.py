@@ -1,6 +1,6 @@
-"""Public sets of recordings of real arms: where each comes from, what is read of it, and its external torques.
+"""Public sets of recordings of real arms: source, columns and external torques of each.
 
-These are the product's observer's, less what half of the runs says of load and friction.
+The torques are those of the product's observer, less load and friction as estimated from half of the runs.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,11 +23,11 @@ from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 
 _APART_S = 1.0
-"""Time laid between runs [s]: more than what the observer and a contact's end take."""
+"""Time between two runs of a stream [s]: longer than the observer's memory and the end of a contact."""
 _COULOMB_RAD_S = 0.05
-"""Width of a joint's turning, over which Coulomb friction changes its sign [rad/s]."""
+"""Range of joint velocity in which Coulomb friction changes its sign [rad/s]."""
 _SHARED_NM = 1e-9
-"""Below it a load shows in no torque [Nm^2]."""
+"""Least sum of squared torques of a load [Nm^2]."""
 
 
 @value
@@ -41,59 +41,59 @@ class RealRun:
     qd: FloatArray
     """(N, n) [rad/s]."""
     torque: FloatArray
-    """(N, n) that drives the joints, gravity in it [Nm]."""
+    """(N, n) torque that drives the joints, gravity included [Nm]."""
     label: IntArray
-    """(N,) 1 in a contact, 0 in free motion, -1 where that is not sure."""
+    """(N,) 1 in a contact, 0 in free motion, -1 if uncertain."""
     joints: tuple[int, ...] = ()
-    """Numbers, from 1, of the joints that move the touched link as the last one; () where the link is not named."""
+    """Numbers, from 1, of the last joint before the touched link, several if uncertain; () for an unnamed link."""
 
     @property
     def touched(self) -> bool:
-        """Whether it has a contact."""
+        """True for a run with a contact."""
         return bool((self.label == 1).any())
 
 
 @dataclass(frozen=True)
 class RealSet:
-    """A set by its name."""
+    """A public set of recordings."""
 
     name: str
     arm: str
-    """panda, or the name of a folder of `arms`."""
+    """panda, or the name of a folder in `arms`."""
     place: str
-    """Its files under the folder of all sets, as a pattern."""
+    """Pattern of its files below the folder of all sets."""
     source: str
     read: Callable[[list[Path]], list[RealRun]]
     of_currents: bool = False
-    """Whether motor currents were measured, with the friction of the gears in them."""
+    """True if motor currents were measured, which contain the friction of the gears."""
 
     def files(self, folder: Path) -> list[Path]:
-        """Its files that are there."""
+        """Return the set's files in a folder."""
         return sorted(folder.glob(self.place))
 
     def arm_of(self, folder: Path) -> str:
-        """The arm as `robot_named` takes it."""
+        """Return the arm's name for `robot_named`."""
         return self.arm if self.arm == "panda" else str(folder / "arms" / self.arm)
 
 
 _BY_NAME = {"2link": (2,), "3link": (3,), "wrist": (4, 5, 6)}
-"""What the names of the UR10e's runs say of the touched link, as numbers of joints."""
+"""Joints of the touched link by a part of a run's name, for the UR10e."""
 _GLOVE = ("time", *(f"{name}{joint}" for name in ("q", "dq", "tau_J") for joint in range(7)), "label")
-"""Columns that are read; joints count from 0."""
+"""Columns to read; joints count from 0."""
 
 
 def _of_arrays(files: list[Path]) -> list[RealRun]:
-    """Read a file of NumPy arrays t, q, dq, tau and run, with label, ok and run_name where it has them."""
+    """Read a file of NumPy arrays t, q, dq, tau and run; label, ok and run_name are optional."""
     try:
         with np.load(files[0], allow_pickle=False) as stored:
             data = {name: stored[name] for name in stored.files}
     except (ValueError, OSError, BadZipFile) as error:
         raise ExperimentError(f"{files[0]} is no file of NumPy arrays ({error}): get it again.") from error
     if missing := {"t", "q", "dq", "tau", "run"} - set(data):
-        raise ExperimentError(f"{files[0]} has no {', '.join(sorted(missing))}: get it again, or take it away.")
+        raise ExperimentError(f"{files[0]} has no {', '.join(sorted(missing))}: get it again, or remove it.")
     label, runs = data.get("label", np.zeros(len(data["t"]), np.int64)), []
     for number in np.unique(data["run"]):
-        # what the logger missed is interpolated in the file: left out, so that the observer steps over it
+        # samples that the logger missed are interpolated in the file: without them the observer steps over the gap
         own = (data["run"] == number) & data.get("ok", np.True_)
         name = str(data["run_name"][number]) if "run_name" in data else ""
         joints = next((joints for part, joints in _BY_NAME.items() if part in name), ())
@@ -102,17 +102,17 @@ def _of_arrays(files: list[Path]) -> list[RealRun]:
 
 
 def _of_glove(files: list[Path]) -> list[RealRun]:
-    """Read tables of contactInterpretation, one a contact place and motion, in a folder for each link.
+    """Read tables of contactInterpretation, one for each contact place and motion, in a folder for each link.
 
-    The measured torques `tau_J` go through our own observer. The file's external ones, `tau_ext`, are not used: nothing
-    there says whose they are. By two of its files they are by the robot on its environment.
+    The measured torques `tau_J` go through our own observer. The external torques `tau_ext` of the files are not used:
+    their sign is not documented. In two files they act from the robot on its environment.
     """
     runs = []
     for file in files:
         with file.open(encoding="utf-8") as lines:
             names = lines.readline().strip().split(",")
             if missing := [name for name in _GLOVE if name not in names]:
-                raise ExperimentError(f"{file} has no column {missing[0]}: get it again, or take it away.")
+                raise ExperimentError(f"{file} has no column {missing[0]}: get it again, or remove it.")
             table = np.loadtxt(lines, delimiter=",", usecols=[names.index(name) for name in _GLOVE], ndmin=2)
         parts, link = np.split(table, (1, 8, 15, 22), axis=1), file.parent.name.removeprefix("link")
         joints = (int(link),) if link.isdecimal() else ()
@@ -121,7 +121,7 @@ def _of_glove(files: list[Path]) -> list[RealRun]:
 
 
 def _run(parts: list[FloatArray], label: FloatArray, joints: tuple[int, ...]) -> RealRun:
-    """Leave out what is not finite, and samples that are not later than those before."""
+    """Return a run without samples that are not finite or not later than those before."""
     time, q, qd, torque = (np.asarray(part, np.float64) for part in parts)
     finite = np.isfinite(np.column_stack([time, q, qd, torque])).all(axis=1)
     latest = np.maximum.accumulate(np.where(finite, time, -np.inf))
@@ -129,6 +129,7 @@ def _run(parts: list[FloatArray], label: FloatArray, joints: tuple[int, ...]) ->
     return RealRun(time[usable], q[usable], qd[usable], torque[usable], label[usable].astype(np.int64), joints)
 
 
+_GLOVE_SOURCE = "rezayati/contactInterpretation, the folders dataset/franka_main/labeled_data/link*"
 SETS = (
     RealSet("franka_fast", "panda", "franka_fast.npz", "alisrour97/Franka_experiments", _of_arrays),
     RealSet("lwr4", "lwr4", "lwr4.npz", "kjyv/FloBaRoID", _of_arrays),
@@ -138,34 +139,31 @@ SETS = (
     RealSet(
         "ur10e_contact", "ur10e", "ur10e_contact.npz", "shamilmamedov/dynamic_calibration", _of_arrays, of_currents=True
     ),
-    RealSet(
-        "contactInterpretation", "panda", "contactInterpretation/link*/*.csv",
-        "rezayati/contactInterpretation, the folders dataset/franka_main/labeled_data/link*", _of_glove,
-    ),
-)  # fmt: skip
-"""All sets. None of them is part of this package: their repositories on GitHub state no licence or LGPL-3."""
+    RealSet("contactInterpretation", "panda", "contactInterpretation/link*/*.csv", _GLOVE_SOURCE, _of_glove),
+)
+"""All sets. None is part of this package: their repositories on GitHub state no licence, or LGPL-3."""
 
 
 def sets_in(folder: Path) -> tuple[list[RealSet], list[str]]:
-    """Return the sets that a folder holds with their arms, and a sentence for each that is left out for want of one.
+    """Return the sets of a folder whose arms are there too, and a sentence for each set without its arm.
 
-    Raises ExperimentError where there is none.
+    Raises ExperimentError if no set is left.
     """
     there = [each for each in SETS if each.files(folder)]
     usable = [each for each in there if each.arm == "panda" or Path(each.arm_of(folder)).is_dir()]
     missing = [
-        f"{each.name} is left out, for {each.arm_of(folder)} is missing: make it with `pretouch robot import`."
+        f"{each.name} is left out, for {each.arm_of(folder)} is missing: create it with `pretouch robot import`."
         for each in there
         if each not in usable
     ]
     if not usable:
         every = "; ".join(f"{each.place} (github.com/{each.source})" for each in SETS)
-        raise ExperimentError(" ".join([f"{folder} has no set that can be played. Looked for were {every}.", *missing]))
+        raise ExperimentError(" ".join([f"{folder} has no set that can be played. The sets are {every}.", *missing]))
     return usable, missing
 
 
 def files_digest(sets: Sequence[RealSet], folder: Path) -> str:
-    """Return the SHA-256 of all that is read of some sets: their files and their arms."""
+    """Return the SHA-256 of the files and arms of some sets."""
     whole = sha256()
     for each in sets:
         for file in each.files(folder):
@@ -177,18 +175,18 @@ def files_digest(sets: Sequence[RealSet], folder: Path) -> str:
 
 @value
 class TorqueStream:
-    """Runs one after the other as one recording. M samples of n joints."""
+    """Runs in one recording, one after the other. M samples of n joints."""
 
     recording: TorqueRecording
     label: IntArray
-    """(M,) as of `RealRun`."""
+    """(M,) labels, see `RealRun`."""
     run: IntArray
-    """(M,) which run a sample is of, as its number in the set."""
+    """(M,) number in the set of each sample's run."""
     load: FloatArray
-    """(M, n) what a mass of 1 kg at the end-effector changes of the external torques [Nm]."""
+    """(M, n) change of the external torques by a mass of 1 kg at the end-effector [Nm]."""
 
     def only(self, runs: Sequence[int]) -> "TorqueStream":
-        """Return some runs, in this order."""
+        """Return a stream of some runs, in this order."""
         r, parts = self.recording, [np.flatnonzero(self.run == number) for number in runs]
         at, time = np.concatenate(parts), _laid([r.time[part] for part in parts])
         some = {name: getattr(r, name)[at] for name in ("q", "qd", "qd_commanded", "tau_ext")}
@@ -196,7 +194,7 @@ class TorqueStream:
 
 
 def _laid(times: Sequence[FloatArray]) -> FloatArray:
-    """Lay runs with their own instants (N,) [s] one after the other, `_APART_S` apart."""
+    """Return the instants of runs (N,) [s] shifted one after the other, `_APART_S` apart."""
     begin, laid = 0.0, []
     for time in times:
         laid.append(time - time[0] + begin)
@@ -205,7 +203,7 @@ def _laid(times: Sequence[FloatArray]) -> FloatArray:
 
 
 def stream_of(real: RealSet, runs: Sequence[RealRun], model: RobotModel) -> TorqueStream:
-    """Bring all runs of a set to external torques, as `pretouch detect` does."""
+    """Compute the external torques of all runs of a set, as `pretouch detect` does."""
     kind, gains = ("current", (1.0,) * model.n) if real.of_currents else ("tau", ())
     arrays = {"q": [r.q for r in runs], "dq": [r.qd for r in runs], kind: [r.torque for r in runs]}
     joints = {name: np.concatenate(parts) for name, parts in arrays.items()}
@@ -219,10 +217,10 @@ def stream_of(real: RealSet, runs: Sequence[RealRun], model: RobotModel) -> Torq
 
 
 def corrected(stream: TorqueStream, learnt: Sequence[int]) -> TorqueStream:
-    """Take away what the free motion of some runs tells of load, offsets and friction.
+    """Subtract load, offsets and friction, estimated from the free motion of some runs.
 
-    One mass at the end-effector, and for each joint an offset, viscous and Coulomb friction, by least squares. The
-    observer delays friction, so what explains it is delayed alike.
+    The model is one mass at the end-effector, and for each joint an offset, viscous and Coulomb friction. The fit is by
+    least squares. The observer delays friction, so the fit uses delayed velocities.
     """
     r, gain = stream.recording, SequentialParams().observer_gain_1_s / stream.recording.rate
     keep, joints = 1.0 / (1.0 + gain), range(r.model.n)
@@ -233,10 +231,10 @@ def corrected(stream: TorqueStream, learnt: Sequence[int]) -> TorqueStream:
     inverse = [np.linalg.pinv(friction[free, j]) for j in joints]
 
     def explained(torques: FloatArray) -> FloatArray:
-        """What friction tells of torques (M, n) [Nm], by those in free motion."""
+        """Return the part of torques (M, n) [Nm] that friction explains, fitted in free motion."""
         return np.stack([friction[:, j] @ (inverse[j] @ torques[free, j]) for j in joints], axis=1)
 
-    # the mass first, by what friction does not explain of either; then friction by what is left
+    # first the mass, from what friction does not explain; then friction, from the rest
     torque, load = (whole[free] - explained(whole)[free] for whole in (r.tau_ext, stream.load))
     mass = -float((torque * load).sum() / max((load**2).sum(), _SHARED_NM))
     left = r.tau_ext + mass * stream.load

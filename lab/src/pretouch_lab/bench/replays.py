@@ -1,4 +1,4 @@
-"""Detectors given the steps of a stream: with their answers to alarms, or their alarms alone in one compiled pass."""
+"""Detectors on the steps of a stream: with the reactions to alarms, or alarms alone in one compiled pass."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,32 +26,32 @@ from pretouch_lab.bench.streams import NOTHING, Stream
 from pretouch_lab.replay import DetectorAlone, FirstMotion
 
 REST = DecayingVelocity().decay_cycles
-"""Control cycles for which an alarm is answered, and no other is looked for."""
+"""Control cycles of the reaction to an alarm; no other alarm counts in them."""
 PERIOD_S = TaskParams().control_period_s
 
 
 @dataclass(frozen=True)
 class Replayed:
-    """What a detector made of S steps."""
+    """Alarms and reactions of a detector in S steps."""
 
     stamp: FloatArray
     """(S,) [s]."""
     alarm: BoolArray
-    """(S,) whether a contact was detected."""
+    """(S,) true where a contact was detected."""
     force: FloatArray
-    """(S, 3) force it was taken for [N], NaN where none was detected."""
+    """(S, 3) force of the detected contact [N], else NaN."""
     motion: FloatArray
-    """(S, n) joint velocities with which the arm would begin to move in answer to an alarm [rad/s], else NaN."""
+    """(S, n) first joint velocities of the reaction to an alarm [rad/s], else NaN."""
     statistic: FloatArray
     """(S,) see `Contender.statistic`."""
 
     def onsets(self, value: float | None = None) -> list[int]:
-        """Return the steps at which an alarm begins; with another value of the sweep than the detector's, if given."""
+        """Return the steps at which an alarm begins, with the detector's parameter or a value of the sweep."""
         return begun(self.alarm if value is None else self.statistic > value)
 
 
 def begun(alarm: BoolArray, rest: int = REST) -> list[int]:
-    """Steps at which an alarm begins, given those (S,) with one: each is answered for `rest` steps."""
+    """Return the steps at which an alarm begins, from flags (S,); each alarm has a reaction of `rest` steps."""
     at, onsets, i = np.flatnonzero(alarm), [], 0
     while i < len(at):
         onsets.append(int(at[i]))
@@ -61,23 +61,23 @@ def begun(alarm: BoolArray, rest: int = REST) -> list[int]:
 
 @dataclass(frozen=True)
 class Steps:
-    """The steps of a stream, worked out once for all detectors."""
+    """The steps of a stream, computed once for all detectors."""
 
     stream: Stream
     model: RobotModel
 
     @cached_property
     def each(self) -> list[tuple[RobotState, Obstacles, bool, bool, Kinematics]]:
-        """As the controller had them: robot, obstacles, whether it reacted, whether a skin watched, and posture."""
+        """Inputs of each step: robot, obstacles, flags for a reaction and for a watching skin, and posture."""
         return [(*step, self.model.kinematics(step[0].q)) for step in self.stream.steps()]
 
     def replay(self, contender: Contender) -> Replayed:
-        """Give a detector each step, from the beginning, of an arm that never reacts; and answer its alarms."""
+        """Replay all steps of an arm that never reacts to a detector, and compute the reactions to its alarms."""
         params, model, react = contender.profile, self.model, contender.profile.react
         if isinstance(react, DecayingVelocity):
             replayed = alarms_of(self, contender)
             for at in replayed.onsets():
-                # eq. 12 by the least joint velocities, as eq. 2 has it far from limits and singularities
+                # eq. 12 by the least joint velocities, as in eq. 2 far from limits and singularities
                 least = np.linalg.pinv(model.ee_jacobian(self.each[at][-1])[:3])
                 push = reaction_velocity(replayed.force[at], react.compliance_m_s_n, react.speed_max_m_s)
                 replayed.motion[at] = least @ push
@@ -99,18 +99,18 @@ class Steps:
 
 
 def alarms_of(steps: Steps, contender: Contender) -> Replayed:
-    """Replay a stream of an arm that never reacts, but for `Replayed.motion`, in an eighth of the time and less."""
+    """Replay a stream without `Replayed.motion`, in an eighth of the time or less."""
     stream, model, params = steps.stream, steps.model, contender.profile
     robot, detect, sees = stream.robot, params.detect, params.perception is not None
     count, valid = len(stream.count), np.isfinite(robot["wrench"][:, 0])
     armed = np.cumsum(valid) - valid >= params.window.samples
     statistic, force = np.full(count, -np.inf), np.full((count, 3), np.nan)
-    seen = Obstacles(**stream.obstacles), stream.count if sees else np.zeros_like(stream.count)
+    near = Obstacles(**stream.obstacles), stream.count if sees else np.zeros_like(stream.count)
     if isinstance(detect, MovingThresholds):
         alarm, window = np.zeros(count, np.bool_), window_init(params.window.samples)
         thresholds = detect.numbers, params.window.numbers, detect.compare == "filtered"
-        made = alarm, statistic, force
-        _by_thresholds(model.hinges, model.ee, (robot["q"], robot["wrench"]), seen, thresholds, window, made)
+        out = alarm, statistic, force
+        _by_thresholds(model.hinges, model.ee, (robot["q"], robot["wrench"]), near, (*thresholds, window), out)
     elif isinstance(detect, FixedBounds):
         force, share = robot["wrench"][:, :3].copy(), (np.abs(robot["tau_ext"]) / detect.bounds(model.n)).max(axis=1)
         statistic = np.fmax(share, np.sqrt((force * force).sum(axis=1)) / detect.force_n)
@@ -126,7 +126,7 @@ def alarms_of(steps: Steps, contender: Contender) -> Replayed:
         test = state, sequential_numbers(model.n, params.task.control_period_s, detect), results
         watch = (stream.watched > 0.0) & sees, no_cues(len(model.links)).gain
         reports = robot["q"], robot["qd"], robot["qd_commanded"], robot["tau_ext"]
-        _by_sequential_test(model.hinges, model.mechanism, reports, seen, watch, test, statistic)
+        _by_sequential_test(model.hinges, model.mechanism, reports, near, (*watch, *test), statistic)
         alarm = statistic >= 1.0
     else:
         raise TypeError(f"the detector {detect.name} has no compiled pass")
@@ -134,20 +134,23 @@ def alarms_of(steps: Steps, contender: Contender) -> Replayed:
     return Replayed(stream.stamp, alarm & armed, force, nothing, np.where(armed, statistic, -np.inf))
 
 
-_Seen = tuple[Obstacles, IntArray]
-"""Obstacles of all steps, one after the other, and how many there are in each (S,)."""
+_Wrenches, _Alarms = tuple[FloatArray, FloatArray], tuple[BoolArray, FloatArray, FloatArray]
+_Near = tuple[Obstacles, IntArray]
+"""Obstacles of all steps, one after the other, and their number in each step (S,)."""
+_Thresholds = tuple[ThresholdParams, WindowParams, bool, Window]
+"""Parameters of the thresholds, and True to compare the filtered force; the window is updated in place."""
+_Test = tuple[BoolArray, FloatArray, SequentialState, SequentialNumbers, SampleTest]
+"""Flags (S,) of a watching skin and gain of each link; the rest belongs to the test and is updated in place."""
 
 
 @entry
-def _by_thresholds(
-    hinges: Hinges, ee: int, robot: tuple[FloatArray, FloatArray], seen: _Seen,
-    params: tuple[ThresholdParams, WindowParams, bool], window: Window, made: tuple[BoolArray, FloatArray, FloatArray],
-) -> None:  # fmt: skip
-    """Write alarms (S,), the largest base forces (S,) at which they would still be such, and F_ext (S, 3), eqs. 8-12.
+def _by_thresholds(hinges: Hinges, ee: int, robot: _Wrenches, near: _Near, params: _Thresholds, out: _Alarms) -> None:
+    """Write alarms (S,), the largest base forces (S,) that keep them, and F_ext (S, 3), eqs. 8-12.
 
-    Of the robot there are q and the wrench. A step without an estimate of the force, NaN, is none for the window.
+    `robot` has q and the wrench. The window leaves out steps without an estimate of the force, NaN.
     """
-    (q, wrench), (obstacles, number), (thresholds, p, filtered), (alarm, statistic, force) = robot, seen, params, made
+    (q, wrench), (obstacles, number), (alarm, statistic, force) = robot, near, out
+    thresholds, p, filtered, window = params
     kin, parts, end = _unplaced(hinges), np.empty((6, 3)), 0
     for i in range(len(q)):
         end += number[i]
@@ -156,29 +159,24 @@ def _by_thresholds(
         place(hinges, q[i], kin)
         add_sample(window, wrench[i, :3], p)
         compared = window.sums[0] if filtered else wrench[i, :3]
-        near = some_of(obstacles, end - number[i], end)
-        alarm[i], _ = compare(window, compared, kin.position[ee], near, thresholds, parts)
+        some = some_of(obstacles, end - number[i], end)
+        alarm[i], _ = compare(window, compared, kin.position[ee], some, thresholds, parts)
         statistic[i] = np.max(np.maximum(compared - parts[0], parts[1] - compared)) + thresholds.f_base_n
         force[i] = compared - parts[2]
 
 
 @entry
 def _by_sequential_test(
-    hinges: Hinges, mechanism: Mechanism, robot: tuple[FloatArray, FloatArray, FloatArray, FloatArray], seen: _Seen,
-    watch: tuple[BoolArray, FloatArray], test: tuple[SequentialState, SequentialNumbers, SampleTest],
-    statistic: FloatArray,
-) -> None:  # fmt: skip
-    """Write the evidence (S,) of a test. Of the robot there are q, qd, qd_commanded and tau_ext.
-
-    `watch` says in which steps a skin watches, and has the gain of each link.
-    """
-    (q, qd, qd_commanded, tau_ext), (obstacles, number), (watched, gain) = robot, seen, watch
-    (state, numbers, results), kin, end = test, _unplaced(hinges), 0
+    hinges: Hinges, mechanism: Mechanism, robot: tuple[FloatArray, ...], near: _Near, test: _Test, statistic: FloatArray
+) -> None:
+    """Write the evidence (S,) of a test. `robot` has q, qd, qd_commanded and tau_ext."""
+    (q, qd, qd_commanded, tau_ext), (obstacles, number), kin, end = robot, near, _unplaced(hinges), 0
+    watched, gain, state, numbers, results = test
     for i in range(len(q)):
         end += number[i]
         place(hinges, q[i], kin)
-        near = some_of(obstacles, end - number[i], end)
-        now = Moment(kin, qd[i], qd_commanded[i], tau_ext[i], near, gain, watched[i], False)
+        some = some_of(obstacles, end - number[i], end)
+        now = Moment(kin, qd[i], qd_commanded[i], tau_ext[i], some, gain, watched[i], False)
         assess_sample(state, now, numbers, mechanism, results)
         statistic[i] = results.log_likelihood_ratio[0]
 

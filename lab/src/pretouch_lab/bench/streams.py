@@ -1,6 +1,6 @@
-"""Streams: what the interface and skin of an arm said, step by step, so that any detector can be given the same again.
+"""Streams: inputs of a detector from an arm and its skin, step by step, so that any detector can replay them.
 
-The arm goes on whatever touches it, in a room with one ghost.
+The arm moves on whatever touches it, in a room with one ghost.
 """
 
 from collections.abc import Callable, Iterator
@@ -27,17 +27,17 @@ from pretouch_lab.replay import Ghost, Place
 from pretouch_lab.trial import Setup, SimulatedTrial
 
 PROFILE = "paper:detect.f_base_n=1000:slow=none:approach=none:perception.closing=on:perception.self_aside_m=0.005"
-"""Of the arms that are recorded: proximity is sensed, but no force is a contact and nothing near changes the motion.
-Closing speeds are there for the detectors that use them, and the arm is left out as `pretouch` does, for all."""
+"""Profile of the recorded arms: they sense proximity, but no force is a contact and no obstacle changes the motion.
+Closing speeds are estimated for detectors that use them. Readings of the arm itself are left out as in `pretouch`."""
 
 _ROBOT = tuple(f.name for f in fields(RobotState))
 _OBSTACLES = Obstacles._fields
 AWAY = np.array([0.0, 0.0, 4.0])
-"""Where the ghost is while it is not there [m]: no unit sees so far."""
+"""Parking place of the ghost (3,) [m], beyond the range of all units."""
 _RETURN_M_S = 0.1
-"""Bound on the speed at which a standing arm goes back to where it is to stand [m/s]."""
+"""Largest speed at which a standing arm returns to its place [m/s]."""
 NOTHING = no_obstacles()
-"""What a profile without proximity is shown."""
+"""Obstacles for a profile without proximity."""
 
 
 @dataclass(frozen=True)
@@ -47,11 +47,11 @@ class Stream:
     robot: dict[str, FloatArray]
     """Each field of `RobotState`, (S, ...); a missing wrench is NaN."""
     reacting: FloatArray
-    """(S,) 1 where the arm moved with a contact, 0 elsewhere."""
+    """(S,) 1 during a reaction to a contact, else 0."""
     watched: FloatArray
-    """(S,) 1 where a skin watched, all of its units heard, 0 elsewhere."""
+    """(S,) 1 while the reports of all units are recent, else 0."""
     count: IntArray
-    """(S,) how many obstacles there were."""
+    """(S,) number of obstacles."""
     obstacles: dict[str, Any]
     """Each field of `Obstacles` of all steps, one after the other, (sum of counts, ...)."""
 
@@ -61,7 +61,7 @@ class Stream:
         return self.robot["stamp"]
 
     def steps(self) -> Iterator[tuple[RobotState, Obstacles, bool, bool]]:
-        """Give each step as the controller had it: robot, obstacles, whether it was reacting, and a skin watched."""
+        """Yield the inputs of each step: robot, obstacles, and flags for a reaction and for a watching skin."""
         ends = np.cumsum(self.count)
         wrench = self.robot["wrench"]
         for i, (end, number) in enumerate(zip(ends.tolist(), self.count.tolist(), strict=True)):
@@ -78,10 +78,10 @@ class Stream:
 
 
 class StreamRecorder:
-    """Keeps of each turn of the loop what detection is given; the plant's own log is thrown away as it comes."""
+    """Stores the inputs of detection in each cycle, and discards the plant's log."""
 
     def __init__(self, plant: Plant, look: Callable[[Cycle], None] | None = None) -> None:
-        """Take the plant, and what else is to be called with each cycle."""
+        """Take the plant, and a function to call with each cycle."""
         self._plant, self._look = plant, look
         self._patience = profile(PROFILE).sight.slow_after_s
         self._robot: list[FloatArray] = []
@@ -89,9 +89,9 @@ class StreamRecorder:
         self._flags: list[tuple[bool, bool]] = []
 
     def record(self, cycle: Cycle) -> None:
-        """Keep one turn of the loop."""
+        """Store one cycle."""
         memory = cycle.after.memory
-        # the fields of the state that was believed lie one behind the other: one copy, for a look-up costs as much
+        # the fields of the believed state are contiguous: one copy, as each look-up costs as much
         begin, end = (memory.places[f"watch.robot.{name}"].at for name in ("stamp", "wrench"))
         robot = memory.blocks[0][begin.start : end.stop].copy()
         reacting = cycle.before.mode.mode is Mode.REACT
@@ -99,17 +99,15 @@ class StreamRecorder:
         if self._look:
             self._look(cycle)
 
-    def add(
-        self, robot: FloatArray, near: Obstacles, stamp: float, heard: FloatArray, reacting: bool = False
-    ) -> None:  # fmt: skip
-        """Keep the state of the robot, its fields one behind the other, what is near, and when each unit was heard."""
+    def add(self, robot: FloatArray, near: Obstacles, stamp: float, reports: FloatArray, reacts: bool = False) -> None:
+        """Store the robot's state, its fields in one array, the obstacles, and the stamp of each unit's last report."""
         self._plant.take_log()
         self._robot.append(robot)
         self._obstacles.append(near if len(near.unit) else NOTHING)
-        self._flags.append((reacting, stamp - float(heard.min(initial=np.inf)) <= self._patience))
+        self._flags.append((reacts, stamp - float(reports.min(initial=np.inf)) <= self._patience))
 
     def stream(self) -> Stream:
-        """Return all that was kept."""
+        """Return the stored steps."""
         near = {name: np.concatenate([getattr(o, name) for o in self._obstacles]) for name in _OBSTACLES}
         count = np.array([len(o.unit) for o in self._obstacles], dtype=np.int64)
         reacting, watched = np.array(self._flags, dtype=np.float64).T
@@ -117,40 +115,40 @@ class StreamRecorder:
 
 
 def _fields_of(rows: list[FloatArray]) -> dict[str, FloatArray]:
-    """Return states of the robot, each the numbers of its fields one behind the other, field by field."""
+    """Split states of the robot, each with its fields in one array, into arrays by field."""
     n, every = model().n, np.array(rows)
     fields = np.split(every, np.cumsum([1, n, n, n, n, n]), axis=1)
     return dict(zip(_ROBOT, (fields[0][:, 0].copy(), *(part.copy() for part in fields[1:])), strict=True))
 
 
 Prepare = Callable[[Plant], Place]
-"""Has things done to an arm before each physics step, and returns where the ghost is."""
+"""Registers calls before each physics step of an arm, and returns the place of the ghost."""
 
 
 @dataclass(frozen=True)
 class Alone:
-    """An arm that is left to itself but for what `prepare` has done to it."""
+    """Parameters of an arm without a commander; only `prepare` acts on it."""
 
     path: TaskPath
     speed_m_s: float
-    """Speed along the path [m/s]; 0 stands."""
+    """Speed along the path [m/s]; 0: the arm stands."""
     plant: PlantParams
     sensing: Sensing | None
-    """None: it has no units, for there is nobody near whom they could see."""
+    """Skin and its errors; None: no units, as nobody is near."""
     ghost_radius: float
     """[m]"""
     seed: int
     end_s: float
-    """When it ends [s]."""
+    """End of the stream [s]."""
     world: str = ""
-    """Set of the domain randomisation of which the seed draws one, or none."""
+    """Set of the domain randomisation that the seed draws from; empty: none."""
     start: FloatArray | None = None
-    """Joint positions (n,) in which it begins [rad]; None: those in which its path does."""
+    """Joint positions (n,) at the start [rad]; None: those at the start of the path."""
     controller: Callable[..., Controller] = Controller
-    """Makes its controller, as `Controller` is made."""
+    """Class of the controller, with the arguments of `Controller`."""
 
     def simulation(self, prepare: Callable[[Plant, RangeFinders], object]) -> SimulatedTrial:
-        """Build it."""
+        """Build the simulated arm."""
         own, sensing, start = profile(PROFILE), self.sensing, (float(AWAY[0]), float(AWAY[1]), float(AWAY[2]))
         return SimulatedTrial(
             Setup(
@@ -171,12 +169,12 @@ class Alone:
         )
 
     def is_over(self, stamp: float) -> bool:
-        """Whether the step at an instant [s] is the last one."""
+        """Return True for the step at or after the end."""
         return stamp >= self.end_s - 0.5 * TaskParams().control_period_s
 
 
 def record(what: Alone, prepare: Prepare, look: Callable[[Plant, Ghost, Cycle], None] | None = None) -> Stream:
-    """Let an arm run until its end and return its stream; `look(plant, ghost, cycle)` sees each cycle."""
+    """Simulate an arm until its end and return its stream; `look(plant, ghost, cycle)` is called in each cycle."""
     ghosts: list[Ghost] = []
     simulation = what.simulation(lambda plant, _: ghosts.append(Ghost(plant, prepare(plant))))
     plant = simulation.plant
@@ -186,10 +184,10 @@ def record(what: Alone, prepare: Prepare, look: Callable[[Plant, Ghost, Cycle], 
 
 
 def record_moved(what: Alone, prepare: Prepare, command: Callable[[float, FloatArray], FloatArray]) -> Stream:
-    """Let an arm that no controller moves run until its end, and return its stream: half the time, without units less.
+    """Simulate an arm without a controller until its end, in half the time or less, and return its stream.
 
-    `command(time, q_commanded)` is its joint velocities (n,) [rad/s] at a time [s], given (n,) [rad]. Of the controller
-    there is perception alone.
+    `command(time, q_commanded)` returns the joint velocities (n,) [rad/s] at a time [s] from positions (n,) [rad].
+    Only the perception of the controller runs.
     """
     simulation = what.simulation(lambda plant, _: Ghost(plant, prepare(plant)))
     plant, controller, recorder = simulation.plant, simulation.controller, StreamRecorder(simulation.plant)
@@ -200,7 +198,7 @@ def record_moved(what: Alone, prepare: Prepare, command: Callable[[float, FloatA
         plant.command(command(stamp, state.q_commanded))
         wrench = np.full(6, np.nan) if state.wrench is None else state.wrench
         parts = (state.q, state.qd, state.q_commanded, state.qd_commanded, state.tau_ext, wrench)
-        near, heard = NOTHING, np.zeros(0)
+        near, reports = NOTHING, np.zeros(0)
         if what.sensing:
             now = controller.blank.copy()
             for name in ("stamp", "distance", "status"):
@@ -209,6 +207,6 @@ def record_moved(what: Alone, prepare: Prepare, command: Callable[[float, FloatA
                 now.put(f"robot.{name}", getattr(state, name))
             now.put("stamp", stamp)
             controller.take(memory, now, controller.beside, SEE, SEE)
-            near, heard = ControlStep.of(now, CLEAR).obstacles, memory.get("tracks.report_stamp")
-        recorder.add(np.concatenate(((state.stamp,), *parts)), near, stamp, heard)
+            near, reports = ControlStep.of(now, CLEAR).obstacles, memory.get("tracks.report_stamp")
+        recorder.add(np.concatenate(((state.stamp,), *parts)), near, stamp, reports)
     return recorder.stream()

@@ -1,6 +1,7 @@
-"""The paper's figures, drawn from the courses of trials."""
+"""Figures of the paper, drawn from the time courses of trials."""
 
 from itertools import product
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,57 +21,53 @@ from pretouch_lab.trial import Trace
 BLIND, SENSING, OURS = "tab:blue", "tab:red", "tab:green"
 AXES = "xyz"
 Y = 1
-"""The axis the paper's figures show."""
+"""Axis in the paper's figures."""
 _SLOWED = 0.99
-_UNITS = (
-    ("black", "-", ""), ("tab:blue", "--", ""), ("tab:orange", "-", "o"), ("tab:green", ":", "s"),
-    ("tab:red", "-.", ""), ("tab:purple", "--", "^"), ("tab:gray", "-", ""),
-)  # fmt: skip
-"""Colour, line and marker of each unit; more units than these begin again."""
+Look = dict[str, Any]
+_COLOURS = ("black", "tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple", "tab:gray")
+_LINES, _MARKERS = ("-", "--", "-", ":", "-.", "--", "-"), ("", "", "o", "s", "", "^", "")
+"""Colour, line and marker of each unit; the eighth unit has those of the first again."""
 _MARKS = 60
-"""Markers along a line over the whole of a trace."""
+"""Number of markers along a line."""
 
 
 def shade(axes: Axes, time: FloatArray, flags: BoolArray, colour: str, hatch: str = "", label: str = "") -> None:
-    """Shade the spans of time (S,) [s] in which flags (S,) hold; a hatch tells it from others in grey."""
+    """Shade the spans of time (S,) [s] with flags (S,); a hatch distinguishes them in grey."""
+    look: Look = {"facecolor": (colour, 0.15), "edgecolor": (colour, 0.4), "lw": 0, "hatch": hatch, "zorder": 0}
     for i, (start, end) in enumerate(spans(flags)):
-        axes.axvspan(
-            time[start], time[min(end, len(time) - 1)], facecolor=(colour, 0.15), edgecolor=(colour, 0.4), lw=0,
-            hatch=hatch, label=label if i == 0 else None, zorder=0,
-        )  # fmt: skip
+        axes.axvspan(time[start], time[min(end, len(time) - 1)], label=label if i == 0 else None, **look)
 
 
 def near(trace: RunRecord, d_max: float) -> BoolArray:
-    """Whether anything sensed in each step (S,) is within d_max [m] of the end-effector's origin."""
+    """Return flags (S,) of the steps with a sensed point within d_max [m] of the end-effector's origin."""
     distance = np.linalg.norm(trace.sensed_point - trace.ee_position[:, None], axis=2)
     return np.any(distance < d_max, axis=1)
 
 
 def slowed(trace: RunRecord) -> BoolArray:
-    """Whether the arm is slowed in each step (S,)."""
+    """Return flags (S,) of the steps in which the arm is slowed."""
     return trace.speed_scale < _SLOWED
 
 
 def touching(trace: RunRecord) -> BoolArray:
-    """Whether something truly touches the arm in each step (S,)."""
+    """Return flags (S,) of the steps with a true contact."""
     return np.linalg.norm(trace.true_force, axis=1) > TOUCH_N
 
 
 def distances(axes: Axes, trace: RunRecord, units: tuple[str, ...]) -> None:
-    """Draw the distance each unit reads."""
+    """Draw the distance that each unit reads."""
     for k, unit in enumerate(units):
-        colour, style, marker = _UNITS[k % len(_UNITS)]
-        axes.plot(
-            trace.time, trace.range_distance[:, k], style, color=colour, lw=1.2, marker=marker, ms=4,
-            markevery=max(1, len(trace.time) // _MARKS), label=unit.replace("_", " "),
-        )  # fmt: skip
+        colour, line, marker = (each[k % len(each)] for each in (_COLOURS, _LINES, _MARKERS))
+        marks: Look = {"marker": marker, "ms": 4, "markevery": max(1, len(trace.time) // _MARKS)}
+        distance, label = trace.range_distance[:, k], unit.replace("_", " ")
+        axes.plot(trace.time, distance, line, color=colour, lw=1.2, label=label, **marks)
     axes.set_ylabel("distance read [m]")
 
 
 def force_with_thresholds(axes: Axes, trace: RunRecord, axis: int, profile: Profile) -> None:
     """Draw the force estimate along an axis, the value of eq. 8 and the moving thresholds.
 
-    Of a detector without thresholds, the bands in which one sample alone is no contact.
+    For a detector without thresholds, draw the band in which a single sample is no contact.
     """
     paper = isinstance(profile.detect, MovingThresholds)
     bounds = "thresholds" if paper else "bands of one sample"
@@ -81,18 +78,18 @@ def force_with_thresholds(axes: Axes, trace: RunRecord, axis: int, profile: Prof
         axes.plot(
             trace.time, trace.filtered_force[:, axis], color="tab:blue", lw=1.8, ls=(0, (4, 1)), label="value of eq. 8"
         )
-    found, force = trace.detected, trace.filtered_force if paper else trace.force
-    axes.plot(trace.time[found], force[found, axis], "v", color="tab:red", mec="black", ms=8, label="detected")
+    alarms, force = trace.detected, trace.filtered_force if paper else trace.force
+    axes.plot(trace.time[alarms], force[alarms, axis], "v", color="tab:red", mec="black", ms=8, label="detected")
     axes.set_ylabel(f"force along {AXES[axis]} [N]")
 
 
 _OFF_PATH_M = 0.01
 _POINTS = 12
-"""One in so many sensed points is drawn."""
+"""One sensed point is drawn for each of these steps."""
 
 
 def circle(traces: list[Trace], _units: tuple[str, ...]) -> Figure:
-    """End-effector path: free, avoiding what is sensed (red), recovering (green); and its course in time."""
+    """Draw the end-effector's path: free, avoiding an obstacle (red), recovering (green); and speed over time."""
     trace, profile = _first(traces)
     figure = Figure(figsize=(9, 9), layout="constrained")
     plane, course, aside = figure.subplots(3, 1, height_ratios=[1.9, 0.8, 0.6])
@@ -139,13 +136,13 @@ def _plane(axes: Axes, trace: RunRecord, avoiding: BoolArray, recovering: BoolAr
 
 
 def _where(position: FloatArray, flags: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Split into y and z (S,) [m] where flags hold, NaN elsewhere, so that a line drawn of them is broken there."""
-    kept = np.where(flags[:, None], position, np.nan)
-    return kept[:, 1], kept[:, 2]
+    """Return y and z (S,) [m] where flags hold, else NaN, so that a line of them breaks there."""
+    line = np.where(flags[:, None], position, np.nan)
+    return line[:, 1], line[:, 2]
 
 
 def interaction(traces: list[Trace], units: tuple[str, ...]) -> Figure:
-    """Distances with the activation line, force along y with moving thresholds, end-effector velocity along y."""
+    """Draw distances with the activation line, force along y with moving thresholds, and velocity along y."""
     trace, profile = _first(traces)
     figure = Figure(figsize=(10, 8.4), layout="constrained")
     top, middle, bottom = figure.subplots(3, 1, sharex=True)
@@ -169,7 +166,7 @@ def interaction(traces: list[Trace], units: tuple[str, ...]) -> Figure:
 
 
 def _name_pushes(axes: Axes, trace: RunRecord) -> None:
-    """Say at the foot of the panel which way each push went, as only one axis of the force is drawn."""
+    """Write the direction of each push at the foot of the panel, which shows only one axis of the force."""
     low, high = axes.get_ylim()
     axes.set_ylim(low - 0.15 * (high - low), high + 0.2 * (high - low))
     last = -np.inf
@@ -183,11 +180,11 @@ def _name_pushes(axes: Axes, trace: RunRecord) -> None:
 
 
 _BEFORE_S, _AFTER_S = 4.0, 2.5
-"""How much of the time about the first touch is shown [s]."""
+"""Time shown before and after the first contact [s]."""
 
 
 def close_up(traces: list[Trace], units: tuple[str, ...]) -> Figure:
-    """Distances with the region that matters, and force along y with thresholds, about the first touch."""
+    """Draw distances with the region of interest, and force along y with thresholds, around the first contact."""
     trace, profile = _first(traces)
     figure = Figure(figsize=(9, 6.4), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True)
@@ -218,7 +215,7 @@ def close_up(traces: list[Trace], units: tuple[str, ...]) -> Figure:
 
 
 def _window(trace: RunRecord) -> tuple[float, float]:
-    """First and last instant to show [s]: about the first touch, or all where there is none."""
+    """Return the first and last instant to show [s]: around the first contact, or all without a contact."""
     touched = np.flatnonzero(touching(trace))
     if len(touched) == 0:
         return float(trace.time[0]), float(trace.time[-1])
@@ -227,7 +224,7 @@ def _window(trace: RunRecord) -> tuple[float, float]:
 
 
 def force_difference(traces: list[Trace], _units: tuple[str, ...]) -> Figure:
-    """Force along y with the band between the thresholds, before and after contact, at each place of the object.
+    """Draw the force along y with the band between the thresholds, around contact, for each place of the object.
 
     Blind is blue, the first of the other profiles red, the second green.
     """
@@ -251,19 +248,18 @@ def force_difference(traces: list[Trace], _units: tuple[str, ...]) -> Figure:
 
 
 def _force(axes: Axes, trace: RunRecord, push: float, name: str, colour: str, hatch: str) -> None:
-    """Draw the estimate and its detection; of a detector by thresholds, these until then and the value of eq. 8 too."""
+    """Draw the estimate and its detection; for thresholds also their band until then, and the value of eq. 8."""
     style, filtered, marker = ("--", ":", "o") if hatch else ("-", "-.", "s")
     touched = np.flatnonzero(touching(trace))
     if len(touched) == 0:
         return
     time = trace.time - trace.time[touched[0]]
-    found = np.flatnonzero(trace.detected & (time >= 0))
-    before = time <= (time[found[0]] if len(found) else time[-1])
+    alarms = np.flatnonzero(trace.detected & (time >= 0))
+    before = time <= (time[alarms[0]] if len(alarms) else time[-1])
     if isinstance(find_profile(name).detect, MovingThresholds):
-        axes.fill_between(
-            time[before], push * trace.lower[before, Y], push * trace.upper[before, Y], facecolor=(colour, 0.15),
-            edgecolor=(colour, 0.5), lw=0.8, ls=style, hatch=hatch, label=f"{name}: between thresholds",
-        )  # fmt: skip
+        band = push * trace.lower[before, Y], push * trace.upper[before, Y]
+        look: Look = {"facecolor": (colour, 0.15), "edgecolor": (colour, 0.5), "lw": 0.8, "ls": style, "hatch": hatch}
+        axes.fill_between(time[before], *band, label=f"{name}: between thresholds", **look)
         axes.plot(time, push * trace.filtered_force[:, Y], color=colour, ls=filtered, lw=1.2, label=f"{name}: eq. 8")
     axes.plot(time, push * trace.force[:, Y], color=colour, ls=style, label=f"{name}: estimate")
-    axes.plot(time[found], push * trace.force[found, Y], marker, color=colour, mec="black", label=f"{name}: detected")
+    axes.plot(time[alarms], push * trace.force[alarms, Y], marker, color=colour, mec="black", label=f"{name}: detected")

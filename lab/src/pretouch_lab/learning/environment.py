@@ -192,9 +192,13 @@ class ReachEnv(gymnasium.Env):  # type: ignore[misc]  # not followed, see pyproj
     render_mode = None
 
     def __init__(
-        self, shield: bool = True, action: ActionKind = "twist", skin_name: str = "paper",
-        scenes: tuple[str, ...] = PEOPLE, reward: Reward | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        shield: bool = True,
+        action: ActionKind = "twist",
+        skin_name: str = "paper",
+        scenes: tuple[str, ...] = PEOPLE,
+        reward: Reward | None = None,
+    ) -> None:
         """Make it; the first reset builds the arm.
 
         Args:
