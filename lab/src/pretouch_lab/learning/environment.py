@@ -112,10 +112,12 @@ class Interface:
 class ReachScene:
     """The arm of a scenario and a seed: the same errors, person and noise as the benchmark's trial of that seed."""
 
-    def __init__(self, scenario: Scenario, profile: Profile, skin: str, seed: int) -> None:
+    def __init__(self, scenario: Scenario, profile: Profile, skin_name: str, seed: int) -> None:
         """Build it, and let the arm stand until contacts can be detected."""
-        scene = setting(replace(scenario, params={**scenario.params, "skin": skin}), profile, seed)
+        scene = setting(replace(scenario, params={**scenario.params, "skin": skin_name}), profile, seed)
         setup = scene.setup
+        if not profile.perception:  # the policy reads units that the controller does not
+            setup = replace(setup, skin=skin(skin_name), believed=None)
         self._path, self._shape, self.model = setup.path, scene.shape, setup.model
         self._arm = SimulatedTrial(setup)
         self._state = self._arm.controller.init(self._arm.plant.read())
