@@ -73,12 +73,16 @@ def test_an_episode_is_cut_after_twelve_seconds():
 
 def test_into_a_board_that_units_see_the_force_ends_the_episode_alone_and_stays_small_under_the_shield():
     # not every board is in view: that of `circle +y` is met out of it, with 114 to 130 N under the shield too
-    peak, earned, ended, last = {}, {}, {}, {}
-    for run, (shield, bound) in {"alone": (False, 140.0), "shielded": (True, 140.0), "gentle": (False, 20.0)}.items():
+    peak, earned, ended = {}, {}, {}
+    for run, (shield, bound) in {
+        "alone": (False, 140.0),
+        "shielded": (True, 140.0),
+        "unbounded": (False, np.inf),
+    }.items():
         env = ReachEnv(shield, scenes=("line +y",), reward=Reward(bound_n=bound))
         env.reset(seed=2)
         limits = set()
-        for last[run] in range(70):
+        for _ in range(70):
             _, earned[run], ended[run], _, info = env.step(TOWARDS_Y)
             limits.add(info["limited"])
             if ended[run]:
@@ -86,8 +90,7 @@ def test_into_a_board_that_units_see_the_force_ends_the_episode_alone_and_stays_
         peak[run] = info["peak_force_n"]
         assert info["contacts"] > 0
         assert ("contact" in limits, "approach" in limits) == (shield, shield)
-    assert ended == {"alone": True, "shielded": False, "gentle": True}
-    assert last["gentle"] < last["alone"]
+    assert ended == {"alone": True, "shielded": False, "unbounded": False}
     assert earned["alone"] < -20.0
     assert peak["alone"] > Reward().bound_n > 3 * peak["shielded"]
 
