@@ -134,7 +134,8 @@ def alarms_of(steps: Steps, contender: Contender) -> Replayed:
     return Replayed(stream.stamp, alarm & armed, force, nothing, np.where(armed, statistic, -np.inf))
 
 
-_Wrenches, _Alarms = tuple[FloatArray, FloatArray], tuple[BoolArray, FloatArray, FloatArray]
+_Wrenches = tuple[FloatArray, FloatArray]
+_Alarms = tuple[BoolArray, FloatArray, FloatArray]
 _Near = tuple[Obstacles, IntArray]
 """Obstacles of all steps, one after the other, and their number in each step (S,)."""
 _Thresholds = tuple[ThresholdParams, WindowParams, bool, Window]
