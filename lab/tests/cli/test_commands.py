@@ -37,7 +37,7 @@ def run(capsys, *args):
         ("demo --seeds 0", "The number of seeds is 0: give at least 1"),
         ("figure square", "The figure 'square' is unknown: choose from force-difference, circle"),
         ("figure circle --seed -1", "The seed is -1"),
-        ("figure circle --out figure.jpg", "no ending that says its format: use .png, .pdf, .svg"),
+        ("figure circle --out figure.jpg", "no known format: end its name in .png, .pdf, .svg"),
         ("figure circle --out /dev/null/x.png", "The figure /dev/null/x.png cannot be written .File exists.: give"),
         ("figure force-difference --profile blind", "cannot show blind, which has no proximity"),
         ("identify x.csv --arm nowhere", "nowhere"),

@@ -227,7 +227,7 @@ def tables(rows: list[Row]) -> list[TextTable]:
     named = [row | {"others": ", ".join(f"{k} {n}" for k, n in row["taken_for"].items()) or "-"} for row in rows]
     note = (
         f"Judged {1000 * rules['after_s']:.0f} ms after the start of the contact, or at its end if that is earlier, and"
-        " again at its end. Error: distance of the reported from the true place, for all detected contacts, right body"
+        " again at its end. Error: distance of the reported from the true place, of all detected contacts, right body"
         " or not. A missed contact is not right. hand: link 7, flange and hand, which the same joints move. Limit:"
         " least error from the torques alone (bound of Cramer and Rao), median. Rate at which 99 of 100 inferences end"
         f" in time: {rates}."

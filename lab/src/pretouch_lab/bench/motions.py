@@ -152,8 +152,11 @@ def _free_of(q: FloatArray, draw: Callable[[], FloatArray]) -> FloatArray:
 
 
 _NEXT: dict[str, Next] = {
-    "random": _anywhere, "standing": _anywhere, "jogging": _one_joint,
-    "stop-and-go": _with_stops, "teleoperation": _a_little,
+    "random": _anywhere,
+    "standing": _anywhere,
+    "jogging": _one_joint,
+    "stop-and-go": _with_stops,
+    "teleoperation": _a_little,
 }
 
 

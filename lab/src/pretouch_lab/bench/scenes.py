@@ -1,4 +1,4 @@
-"""Scenario files: what is played, fixed with checksums before any detector was built; arms and skins by their names."""
+"""Scenario files, fixed by checksums before any detector was built, and arms and skins by name."""
 
 import tomllib
 from collections.abc import Iterator
@@ -24,24 +24,24 @@ from pretouch.types import FloatArray
 
 FOLDER = Path(str(files("pretouch_lab.bench") / "scenarios"))
 CHECKSUMS = "CHECKSUMS"
-"""File in the folder with a line `DIGEST  NAME` (SHA-256) for each of the others, as `sha256sum` writes it."""
+"""File with a line `DIGEST  NAME` (SHA-256) for each other file, in the format of `sha256sum`."""
 
 SeedRange = Literal["published", "development"]
-"""Seeds for the published tables, and others to develop detectors with."""
+"""Seeds for the published tables, and seeds to develop detectors with."""
 
 
 def scenario_path(name: str, folder: Path = FOLDER) -> Path:
-    """Return where a scenario file is, once it is found to be as it was fixed; an ExperimentError if it is not."""
-    path, known = folder / name, checksums(folder)
-    if name not in known:
-        raise ExperimentError(f"The scenario file {name} has no checksum: choose from {', '.join(known)}.")
+    """Return the path of a scenario file after a check of its digest. Raises ExperimentError for a changed file."""
+    path, digests = folder / name, checksums(folder)
+    if name not in digests:
+        raise ExperimentError(f"The scenario file {name} has no checksum: choose from {', '.join(digests)}.")
     try:
         digest = sha256(path.read_bytes()).hexdigest()
     except OSError as error:
         raise ExperimentError(f"The scenario file {path} cannot be read: {error.strerror}: install again.") from error
-    if digest != known[name]:
+    if digest != digests[name]:
         raise ExperimentError(
-            f"The scenario file {path} was changed, its SHA-256 is {digest[:12]}..., not {known[name][:12]}...:"
+            f"The scenario file {path} was changed, its SHA-256 is {digest[:12]}..., not {digests[name][:12]}...:"
             " scenarios are fixed before detectors are built, so put the file back."
         )
     return path
@@ -49,12 +49,12 @@ def scenario_path(name: str, folder: Path = FOLDER) -> Path:
 
 @cache
 def scenario(name: str, folder: Path = FOLDER) -> dict[str, Any]:
-    """Read a scenario file of this name without `.toml`; one that was changed is an ExperimentError."""
+    """Read the scenario file `NAME.toml`. Raises ExperimentError for a changed file."""
     return tomllib.loads(scenario_path(f"{name}.toml", folder).read_text(encoding="utf-8"))
 
 
 def checksums(folder: Path = FOLDER) -> dict[str, str]:
-    """Return the SHA-256 digest of each scenario file by its name."""
+    """Return the SHA-256 digest of each scenario file by name."""
     try:
         lines = (folder / CHECKSUMS).read_text(encoding="utf-8").splitlines()
     except OSError as error:
@@ -66,9 +66,9 @@ def checksums(folder: Path = FOLDER) -> dict[str, str]:
 def numbered(
     family: dict[str, Any], entries: list[dict[str, Any]], seeds: SeedRange, quick: bool
 ) -> Iterator[tuple[dict[str, Any], int]]:
-    """Give each entry of a family as often as it is played, each time with a seed of its own.
+    """Yield each entry of a family for each of its trials, with a seed.
 
-    The n-th of the full run has the n-th seed, in a quick run too.
+    The n-th trial of the full run has the n-th seed, in a quick run too.
     """
     every = [(entry, i) for entry in entries for i in range(entry["full"])]
     for number, (entry, i) in enumerate(every):
@@ -77,49 +77,51 @@ def numbered(
 
 
 def seed_of(family: dict[str, Any], seeds: SeedRange, number: int) -> int:
-    """Return the seed of a family's cell number `number` (from 0) in a range of seeds."""
+    """Return the seed of trial `number` (from 0) of a family in a range of seeds."""
     first, last = family["seeds"][seeds]
     if not 0 <= number <= last - first:
-        raise ExperimentError(f"There is no seed number {number} in the {seeds} ones, {first} to {last}: take fewer.")
+        raise ExperimentError(
+            f"There is no seed number {number} in the {seeds} ones, {first} to {last}: play fewer trials."
+        )
     return int(first) + number
 
 
 @dataclass(frozen=True)
 class Sensing:
-    """A skin and how it errs, as a scenario file names it."""
+    """A skin of a scenario file with its errors."""
 
     skin: Skin
-    """Where the units are."""
+    """Units at their true places."""
     believed: Skin
-    """Where the controller believes them to be."""
+    """Units at the places that the controller assumes."""
     ranging: RangeFinderParams
     hand_radius: float
-    """Of the person's visible hand [m]."""
+    """Radius of the person's visible hand [m]."""
 
 
 @dataclass(frozen=True)
 class ArmCell:
-    """One kind of arm of the detection benchmark, and what happens to it; a seed makes one of it."""
+    """One kind of arm of the detection benchmark, its motion and its contacts; a seed draws an arm of it."""
 
     family: str
     """free, contacts or hard: the scenario file."""
     kind: str = "nominal"
-    """Of `arms.toml`."""
+    """Name in `arms.toml`."""
     sensing: str = "nominal"
-    """Of `sensing.toml`."""
+    """Name in `sensing.toml`."""
     path: str = "circle"
-    """circle, line or rest; of the family hard a motion of its file."""
+    """circle, line or rest; in the family hard a motion of its file."""
     speed_m_s: float = 0.0
     near: str = "nothing"
-    """nothing, standing or passing; touched: a hand comes, touches and goes, again and again."""
+    """nothing, standing or passing; touched: a hand touches the arm again and again."""
     counted_s: float = 0.0
-    """Time that counts [s], after the warm-up."""
+    """Time after the warm-up in which alarms count [s]."""
     count: int = 0
-    """Contacts."""
+    """Number of contacts."""
     ablated: bool = False
-    """Whether ablations are given it."""
+    """True if ablations replay it."""
     world: str = ""
-    """Set of the domain randomisation of which the seed draws one, or none."""
+    """Set of the domain randomisation that the seed draws from; empty: none."""
 
 
 @cache
@@ -134,7 +136,7 @@ def plant_of(kind: str) -> PlantParams:
 
 
 def sensing_of(name: str, seed: int, skin: Skin | None = None) -> Sensing:
-    """Return the skin of a name in `sensing.toml`, or another one that errs so; a seed says how units are misplaced."""
+    """Return the named skin of `sensing.toml`, or `skin` with its errors; the seed draws misplacements of units."""
     values: dict[str, Any] = dict(scenario("sensing")[name])
     kind, radius = values.pop("skin"), values.pop("hand_radius")
     error = Misplacement(values.pop("position_mm", 0.0), values.pop("orientation_deg", 0.0))
@@ -144,7 +146,7 @@ def sensing_of(name: str, seed: int, skin: Skin | None = None) -> Sensing:
 
 
 def path_of(name: str) -> TaskPath:
-    """Return a path by its name: circle, line (to and fro), or rest."""
+    """Return a path by name: circle, line (to and fro), or rest."""
     if name == "line":
         return WayPoints(np.array([[0.4, 0.5, 0.5], [0.4, -0.5, 0.5]]), closed=True)
     return Circle() if name == "circle" else Standing(Circle().point(0.0))
@@ -152,7 +154,7 @@ def path_of(name: str) -> TaskPath:
 
 @dataclass(frozen=True)
 class Standing:
-    """A path that is one point, so that the arm stands."""
+    """A path of one point: the arm stands."""
 
     at: FloatArray
     """(3,) [m], base frame."""
@@ -164,5 +166,5 @@ class Standing:
         return self.at
 
     def tangent(self, _phase: float) -> FloatArray:
-        """Return no direction (3,)."""
+        """Return zero (3,), no direction."""
         return np.zeros(3)

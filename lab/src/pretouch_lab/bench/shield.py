@@ -1,4 +1,4 @@
-"""Filters between a commander and the arm, compared: what holds whoever commands, and what it costs."""
+"""Filters between a commander and the arm, compared by limits that hold for any command, and by their interventions."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -30,33 +30,32 @@ FILTERS: dict[str, Profile] = {
     "paper": profile("paper"),
     "none": profile("pretouch:approach=none:null_space=none"),
 }
-"""`none` sees what `pretouch` does, answers contacts as it does, and keeps the limits of the joints alone."""
+"""`none` senses and reacts to contacts like `pretouch`, but limits only the joints."""
 SCENES = ("walking", "srdo", "drdo", "inside")
-"""Scenarios of `bench avoidance` in which somebody moves: a person walks up, an obstacle passes over a standing arm or
-into the way of a moving one, a hand is held in the way and taken away."""
+"""Scenarios of `bench avoidance` with motion: a person walks up, an obstacle passes over a standing arm or into the path
+of a moving one, a hand is put into the path and withdrawn."""
 SEEN_S = 0.4
-"""How long the touching part has to have been known to be near [s]: latency and what a row takes, at its rate of
-tightening, from the fastest approach that the braking curve leaves at its greatest distance (0.06 s + 0.8 / 3 s), and
-two readings."""
+"""Time before a contact in which the touching part must be in view [s]: latency and the time in which a row tightens from
+the fastest approach on the braking curve (0.06 s + 0.8 / 3 s), and two readings."""
 SAME_M = 0.1
-"""How near to the touching place of the arm a sensed point's closest point has to be [m]."""
+"""Largest distance of a sensed point's closest point from the touching place of the arm [m]."""
 TOLERANCE = 1e-9
-"""By how much a joint may pass a limit of position [rad], velocity [rad/s] or acceleration [rad/s, in a period] before
-that counts: rounding."""
+"""Rounding error that a joint may exceed a limit by: position [rad], velocity [rad/s], acceleration [rad/s, in a
+period]."""
 _AFTER_S, _APART_S = 1.5, 0.2
-"""A trial ends so long after its first touch; touches so near after the last contact belong to it [s]."""
+"""Time from the first touch to the end of a trial, and longest break within one contact [s]."""
 _TRIALS = {"pretouch": (50, 100), "paper": (6, 14), "none": (6, 14)}
-"""Trials of a scene, with the commanders `tracking` and `at-person`."""
+"""Numbers of trials of a scene, with the commanders `tracking` and `at-person`."""
 _DRIVE_1_S = 50.0
 
 
 def speed_bound(mistaken: float) -> float:
-    """Largest speed of a touching point along the normal, if it was thought so much farther than it was [m/s].
+    """Bound on the speed of a touching point along the normal [m/s], if its distance was overestimated by `mistaken` [m].
 
-    The braking curve of the profile `pretouch` at that distance, which is the touch speed where nothing was mistaken,
-    and what the drives are off by: a critically damped impedance of w = 50 rad/s (3000 Nm/rad, 1.2 kg m^2) answers an
-    acceleration that changes by a with a velocity that is off by up to a / (e w), here for what a row may loosen and
-    tighten by.
+    It is the braking curve of the profile `pretouch` at that distance, the touch speed without a mistake, and the error
+    of the drives. A critically damped impedance of w = 50 rad/s (3000 Nm/rad, 1.2 kg m^2) follows a step a of the
+    acceleration with a velocity error of up to a / (e w). Here a is the sum of the rates at which a row may loosen and
+    tighten.
     """
     p = BrakingParams()
     cap = braking_cap(mistaken, p.touch_speed_max_m_s, p.deceleration_m_s2, p.latency_s, p.margin_m)
@@ -64,14 +63,14 @@ def speed_bound(mistaken: float) -> float:
 
 
 Commander = Callable[[float, Kinematics, FloatArray], Desired]
-"""Asks for a motion at a time [s], knowing the arm's true posture and where the person is (3,) [m]."""
+"""Returns a desired motion at a time [s] from the arm's true posture and the person's position (3,) [m]."""
 
 
 class AtPerson:
-    """Drives at the person on purpose, at a speed it draws: the hand, what is nearest, or one of the arm's capsules."""
+    """A commander that drives a part of the arm at the person: the hand, the nearest part, or one of the capsules."""
 
     def __init__(self, scene: Setting, seed: int) -> None:
-        """Draw a way, a part and a speed of 0.2 to 1.5 m/s."""
+        """Draw a kind, a part and a speed of 0.2 to 1.5 m/s."""
         rng = np.random.default_rng([seed, 31])
         self._way, share, self._speed = int(rng.integers(0, 3)), rng.random(), rng.uniform(0.2, 1.5)
         self._model, self._shape = scene.setup.model, scene.shape
@@ -88,19 +87,19 @@ class AtPerson:
             return twist(now, self._speed * way / max(float(np.linalg.norm(way)), 1e-6))
         near = nearest(kin, self._body, self._shape(person))
         J = self._model.jacobian(kin, near.link, near.point)[:3]
-        # damped, so that no singularity asks for more than joints can
+        # damped, so that singularities need no infinite joint velocities
         return joint_velocities(now, J.T @ np.linalg.solve(J @ J.T + 0.05**2 * np.eye(3), self._speed * near.direction))
 
 
 class Tracking:
-    """An ordinary commander: resolved rate along a path at 0.2 m/s by the clock, whoever is in the way."""
+    """An ordinary commander: resolved rate along a path at 0.2 m/s by the clock, without regard to people."""
 
     def __init__(self, scene: Setting) -> None:
         """Take the path of a scene."""
         self._path, self._model = scene.setup.path, scene.setup.model
 
     def goal(self, now: float) -> FloatArray:
-        """Return where the hand should be at a time (3,) [m]."""
+        """Return the position (3,) [m] on the path at a time."""
         way = 0.2 * now
         return self._path.point(way if self._path.closed else min(way, self._path.length))
 
@@ -112,7 +111,7 @@ class Tracking:
 
 
 def plays(seeds: SeedRange, quick: bool) -> list[Play]:
-    """Return all trials: each filter and commander in each scene, a quick run with one seed."""
+    """Return all trials: each filter and commander in each scene, with one seed in a quick run."""
     return [
         ({"filter": name, "commander": commander, "scene": scene}, seed)
         for name in FILTERS
@@ -123,7 +122,7 @@ def plays(seeds: SeedRange, quick: bool) -> list[Play]:
 
 
 def trial(cell: Cell, seed: int) -> Row:
-    """Play a trial, and measure its touches, its limits, and what the filter changed."""
+    """Play a trial, and measure its touches, its violations of limits, and the change by the filter."""
     scene = setting(scenarios()[cell["scene"]], FILTERS[cell["filter"]], seed)
     ordinary = Tracking(scene) if cell["commander"] == "tracking" else None
     commander: Commander = ordinary or AtPerson(scene, seed)
@@ -165,19 +164,19 @@ def trial(cell: Cell, seed: int) -> Row:
 
 
 def asked_velocity(desired: Desired, model: RobotModel, kin: Kinematics) -> FloatArray:
-    """Velocity (3,) of the end-effector origin that a commander asks for [m/s]."""
+    """Return the velocity (3,) of the end-effector's origin that a commander desires [m/s]."""
     first = desired.number[0]
     return first[:3] if desired.kind is DesiredKind.TWIST else np.asarray(model.ee_jacobian(kin)[:3] @ first)
 
 
 def breaks_limits(q: FloatArray, before: FloatArray, command: FloatArray, limits: JointLimits) -> BoolArray:
-    """Whether each of S commands breaks a limit of a joint, or is no number.
+    """Return flags (S,) of the commands that violate a limit of a joint or are NaN.
 
     Args:
-        q: (S, n) commanded positions when it ends [rad].
-        before: (S, n) command before it [rad/s].
-        command: (S, n) [rad/s].
-        limits: those of the controller, its margin at the ends of the joints included.
+        q: (S, n) commanded positions at the end of each step [rad].
+        before: (S, n) previous commands [rad/s].
+        command: (S, n) commands [rad/s].
+        limits: those of the controller, with its margin at the ends of the joints.
     """
     slow = np.abs(command) <= limits.qd_max + TOLERANCE
     smooth = np.abs(command - before) <= limits.qdd_max * limits.period + TOLERANCE
@@ -186,10 +185,10 @@ def breaks_limits(q: FloatArray, before: FloatArray, command: FloatArray, limits
 
 
 def touches_of(record: Record, scene: Setting) -> list[Row]:
-    """Return the touches of a trial that are no echo of the one before, each with its speed and whether it was seen.
+    """Return the separate touches of a trial, each with its speed and the error of the sensed distance.
 
-    The speed is that of the touching point of the arm along the normal to the person, before the contact: what a
-    controller can answer for.
+    The speed is that of the touching point of the arm along the normal to the person, before the contact: the part that
+    a controller determines.
     """
     times, rows = record.times(), []
     pressed = record.true_time[np.linalg.norm(record.true_force, axis=1) > TOUCH_N]
@@ -203,10 +202,10 @@ def touches_of(record: Record, scene: Setting) -> list[Row]:
 
 
 def _mistaken(record: Record, scene: Setting, at: int, link: int) -> float | None:
-    """By how much the touching part was thought farther than it was, at most [m]; None where it was not seen in time.
+    """Return the largest overestimate of the touching part's distance [m]; None if it was not seen in time.
 
-    It was if in each step of the last `SEEN_S` the point of the body nearest to one of the controller's obstacles lay
-    on the touching body, within `SAME_M` of the place that is truly nearest.
+    It was seen in time if each step of the last `SEEN_S` has an obstacle whose closest point of the body is on the
+    touching body, within `SAME_M` of the truly nearest place.
     """
     rigid, worst = scene.setup.model.rigid, -np.inf
     first = int(np.searchsorted(record.times(), record.steps[at].stamp - SEEN_S))
@@ -221,21 +220,21 @@ def _mistaken(record: Record, scene: Setting, at: int, link: int) -> float | Non
 
 
 def _near(record: Record, scene: Setting, at: int, link: int) -> Nearest:
-    """Closest points of the person and the rigid body of a link at a step."""
+    """Return the closest points of the person and the rigid body of a link at a step."""
     model = scene.setup.model
     body = model.body.of_links(np.flatnonzero(model.rigid == model.rigid[link]))
     return nearest(model.kinematics(record.steps[at].q), body, scene.shape(record.hand_position[at]))
 
 
 def results(rows: Iterable[Row]) -> list[Row]:
-    """Return a row for each filter and commander; touches that were seen in time are apart from the others."""
+    """Return a row for each filter and commander, with touches seen in time and others separate."""
     groups = []
     for key, trials in grouped(rows, ("filter", "commander")):
         steps = sum(trial["steps"] for trial in trials)
         touches = [touch for trial in trials for touch in trial["touches"]]
-        seen = [touch for touch in touches if touch["mistaken_m"] is not None]
-        excess = [touch["speed_m_s"] - speed_bound(touch["mistaken_m"]) for touch in seen]
-        kinds = {"": seen, "unseen_": [touch for touch in touches if touch["mistaken_m"] is None]}
+        visible = [touch for touch in touches if touch["mistaken_m"] is not None]
+        excess = [touch["speed_m_s"] - speed_bound(touch["mistaken_m"]) for touch in visible]
+        kinds = {"": visible, "unseen_": [touch for touch in touches if touch["mistaken_m"] is None]}
         row = {
             "trials": len(trials),
             "steps": steps,
@@ -277,13 +276,13 @@ _COLUMNS = (
 def tables(groups: list[Row]) -> list[TextTable]:
     """Return the table of `results`."""
     note = (
-        f"A limit of position, velocity or acceleration is broken by more than {TOLERANCE:g}, or by no number. seen: in"
-        f" each step of the {SEEN_S:g} s before the touch the controller knew a point whose closest point on the body"
-        f" lay within {100 * SAME_M:.0f} cm of the touching place. The bound is the speed that the braking curve leaves"
-        " where that was thought farther than it was, and what the drives are off by:"
-        f" {speed_bound(0.01):.2f} m/s at 1 cm, {speed_bound(0.02):.2f} at 2 cm, {speed_bound(0.05):.2f} at 5 cm."
-        " Where nothing was seen no filter can know. least: least true distance. off: rms distance of the hand from"
-        " where the ordinary commander wants it. change: rms of how far the command at the end-effector is from what"
-        " was asked."
+        "Limits broken: steps that exceed a limit of position, velocity or acceleration by more than"
+        f" {TOLERANCE:g}, or are NaN. seen: in each step of the {SEEN_S:g} s before the touch the controller had a point"
+        f" whose closest point on the body was within {100 * SAME_M:.0f} cm of the touching place. The bound is the"
+        " speed on the braking curve at the overestimate of the distance, plus the error of the drives:"
+        f" {speed_bound(0.01):.2f} m/s at 1 cm, {speed_bound(0.02):.2f} at 2 cm, {speed_bound(0.05):.2f} at 5 cm. unseen:"
+        " no filter can prevent these touches. least: least true distance. off: rms distance of the hand from the goal"
+        " of the ordinary commander. change: rms difference of the velocities of the end-effector before and after the"
+        " filter."
     )
     return [table("What holds whoever commands, and what it costs", _COLUMNS, groups, note, 2)]

@@ -1,8 +1,8 @@
-"""How much faster than real time closed-loop trials run on one core.
+"""Speed of closed-loop trials on one core, as a multiple of real time.
 
-Simulated arm at 1 kHz, units with 19 rays each at 50 Hz, controller at 100 Hz with the profile `paper`, on the paper's
-circle: with nothing near, and with a person who pushes three times, in the usual world or in `hard`. Counted is the CPU
-time of the process, so other load hardly disturbs it. A first, short run compiles everything and is not counted.
+The arm is simulated at 1 kHz, with units of 19 rays each at 50 Hz and a controller at 100 Hz with the profile `paper`,
+on the paper's circle: with nothing near, and with a person who pushes three times, in the nominal world or in `hard`.
+The measure is the CPU time of the process, which other load hardly changes. A short first run compiles everything.
 
     python -m pretouch_lab.bench.throughput
     python -m pretouch_lab.bench.throughput 60    # simulated seconds, 30 by default
@@ -28,7 +28,7 @@ from pretouch_lab.table import Column, table
 from pretouch_lab.trial import Setup, play
 
 CASES = ((7, False, ""), (32, False, ""), (7, True, ""), (32, True, ""), (7, True, "hard"), (32, True, "hard"))
-"""Units, whether a person pushes, world."""
+"""Number of units, True with a person who pushes, world."""
 _COLUMNS = (
     Column("units", "units"),
     Column("person", "person"),
@@ -39,7 +39,7 @@ _COLUMNS = (
 
 
 def trial(units: int, person: bool, world: str, duration_s: float) -> Row:
-    """Run a trial for some simulated seconds: a row of the table."""
+    """Run a trial for some simulated seconds; return a row of the table."""
     model, paper = RobotModel(panda()), profile("paper")
     skin = paper_skin(model) if units == 7 else Workload(model, units, paper, seed=3).skin
     hand, pusher = (HandSpec(), Pusher(model, dynamic_pushes(0))) if person else (None, None)
@@ -52,7 +52,7 @@ def trial(units: int, person: bool, world: str, duration_s: float) -> Row:
 
 
 def main(duration_s: float = 30.0) -> None:
-    """Warm up, measure, show."""
+    """Warm up, measure, and print the table."""
     for case in CASES:
         trial(*case, 0.5)
     rows = [trial(*case, duration_s) for case in CASES]

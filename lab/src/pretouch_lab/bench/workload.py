@@ -1,4 +1,4 @@
-"""Work for a control step: many points near an arm that moves and is restricted by them."""
+"""Workload of a control step: many points near a moving arm that restrict its motion."""
 
 import itertools
 
@@ -17,38 +17,38 @@ from pretouch.sensing.unit import SensorUnit
 from pretouch.types import FloatArray, Inputs, RangeReadings, RangeStatus, RobotState
 
 LARGEST_SKIN = 10_000
-"""Units from which the arm would be covered more than once over."""
+"""Largest number of units: more would cover the arm more than once."""
 UNIT_RATE = 50.0
-"""Readings of a unit in a second (paper, III-A)."""
+"""Readings of a unit per second (paper, III-A)."""
 
 _SPHERES, _SPHERE_RADIUS = 40, 0.1
 _ROOM_CENTER, _ROOM_RADIUS = np.array([0.25, 0.0, 0.45]), 1.0
-"""The Panda's room is round, and as wide as the arm can reach [m]: every beam ends at a sphere or at its wall."""
+"""Centre and radius of the Panda's round room [m], as wide as its reach: every beam ends at a sphere or at the wall."""
 _CLEAR = 0.3, 0.5
-"""Nearest and farthest a sphere's surface lies from the arm at the start [m]: much nearer, eq. 6 lets nothing move."""
+"""Least and largest distance of a sphere from the arm at the start [m]; nearer spheres would stop the arm by eq. 6."""
 _HAND, _CIRCLE = 0.1, 0.1
 """Reach of the hand round its origin, and radius of the path [m]."""
 _JOINTS_BEFORE = 2
-"""Joints that move the first link with units."""
+"""Number of joints that move the first link with units."""
 _ABOVE, _SEEN = 0.006, 0.55
 """Height of a unit above its link, and its largest first reading [m]: within d_notice of Table I."""
 _FORCE_NOISE, _DRAWS = 0.3, 4096
 """Standard deviation of the force estimate [N], and its samples before they repeat."""
 _IN_VAIN, _TRIES = 20, 40
-"""Rounds over all links without a single unit after which there is none to be had, and places that are tried on a link
-before the next one: some have few that see anything."""
+"""Number of rounds over all links without a single unit before an error, and of tries on a link before the next one:
+some links have few places with a view."""
 
 
 class Workload:
-    """An arm with K units among spheres in a round room, on a circle, that does exactly as it is commanded.
+    """An arm with K units among spheres in a round room, on a circle, that follows its commands exactly.
 
-    Every unit sees something, 50 times a second, each at times of its own; with `all_new` every reading is stamped new
-    in every cycle, as no real skin's are. Time is counted in cycles, so a run is the same whatever the machine does
-    meanwhile.
+    Every unit has a reading 50 times a second, at times of its own. With `all_new` every reading has a new stamp in
+    every cycle, unlike those of a real skin. Time is counted in cycles, so a run does not depend on the speed of the
+    machine.
     """
 
     def __init__(self, model: RobotModel, units: int, profile: Profile, seed: int, all_new: bool = False) -> None:
-        """Draw spheres, skin and the units' times with a seed."""
+        """Draw spheres, skin and the units' times from a seed."""
         if not 1 <= units <= LARGEST_SKIN:
             raise ExperimentError(f"The number of points is {units}: give 1 to {LARGEST_SKIN}.")
         rng = np.random.default_rng(seed)
@@ -68,7 +68,7 @@ class Workload:
         self._turn, self._distance = np.full(units, -np.inf), np.zeros(units)
 
     def inputs(self) -> Inputs:
-        """What the controller is given in this cycle."""
+        """Return the controller's inputs in this cycle."""
         units, now = len(self.skin), self._cycle * self._period
         turn = np.floor((now - self._phase) * UNIT_RATE)
         due = np.flatnonzero(turn > self._turn)
@@ -83,11 +83,11 @@ class Workload:
         return Inputs(now, robot, readings)
 
     def move(self, qd: FloatArray) -> None:
-        """Let one cycle pass with joint velocities (n,) [rad/s]."""
+        """Advance one cycle with joint velocities (n,) [rad/s]."""
         self._q, self._qd, self._cycle = self._q + qd * self._period, qd, self._cycle + 1
 
     def _ranges(self, origin: FloatArray, beam: FloatArray) -> FloatArray:
-        """Distance (k,) [m] along rays (k, 3) to the nearest sphere, or from within to the room's wall."""
+        """Return the distance (k,) [m] along rays (k, 3) to the nearest sphere, or to the room's wall."""
         along, half = _crossing(origin, beam, self.spheres, _SPHERE_RADIUS)
         sphere = np.where((half >= 0) & (along > 0), along - np.sqrt(np.maximum(half, 0.0)), np.inf).min(axis=1)
         along, half = _crossing(origin, beam, self._wider * _ROOM_CENTER[None], self._wider * _ROOM_RADIUS)
@@ -95,7 +95,7 @@ class Workload:
         return np.minimum(sphere, wall)
 
     def _skin(self, rng: np.random.Generator, units: int, body: Capsules) -> Skin:
-        """Put units on all links in turn that look away from the arm as it stands, and at something near."""
+        """Place units on all links in turn that face away from the arm in its posture, and see a near surface."""
         model, kin, skin = self._model, self._model.kinematics(self._q), list[SensorUnit]()
         first = int(np.argmax(model.moved_by.sum(axis=1) >= _JOINTS_BEFORE))
         for tried, link in enumerate(itertools.cycle(range(first, len(model.links)))):
@@ -103,15 +103,15 @@ class Workload:
                 break
             if not skin and tried > _IN_VAIN * len(model.links):
                 raise ExperimentError(
-                    f"No unit on {model.description.name} sees past the arm, posture as in q_ready: give another"
-                    " q_ready in robot.toml, more stretched out."
+                    f"No unit on {model.description.name} sees past the arm in the posture q_ready: set a more"
+                    " stretched q_ready in robot.toml."
                 )
             capsules = np.flatnonzero(body.link == link)
             for _ in range(_TRIES if len(capsules) else 0):
                 T_O_sensor = _outwards(rng, body, int(rng.choice(capsules)))
                 p, beam = T_O_sensor[:3, 3], T_O_sensor[:3, 2]
-                seen = float(self._ranges(p[None], beam[None])[0])
-                if seen <= _SEEN and _sees_past(body, link, p, beam, seen):
+                reading = float(self._ranges(p[None], beam[None])[0])
+                if reading <= _SEEN and _sees_past(body, link, p, beam, reading):
                     T, R = np.eye(4), kin.rotation[link]
                     T[:3, :3], T[:3, 3] = R.T @ T_O_sensor[:3, :3], R.T @ (p - kin.position[link])
                     skin.append(SensorUnit(f"unit_{len(skin)}", model.links[link], T))
@@ -125,7 +125,7 @@ def _distance(points: FloatArray, body: Capsules) -> FloatArray:
 
 
 def _spheres(rng: np.random.Generator, body: Capsules, around: FloatArray) -> FloatArray:
-    """Centres (S, 3) [m] of spheres round the arm, none near the way (P, 3) of its hand."""
+    """Draw the centres (S, 3) [m] of spheres round the arm, none near the path (P, 3) of its hand."""
     low, high = np.minimum(body.a, body.b).min(axis=0) - 1.0, np.maximum(body.a, body.b).max(axis=0) + 1.0
     centers: list[FloatArray] = []
     while len(centers) < _SPHERES:
@@ -149,9 +149,9 @@ def _outwards(rng: np.random.Generator, body: Capsules, c: int) -> FloatArray:
     return T
 
 
-def _sees_past(body: Capsules, link: int, p: FloatArray, beam: FloatArray, seen: float) -> bool:
-    """Whether a unit lies outside the arm, and no other link reaches into its cone as far as it sees."""
-    along = np.linspace(0.0, seen, 16)
+def _sees_past(body: Capsules, link: int, p: FloatArray, beam: FloatArray, reading: float) -> bool:
+    """Return True if a unit is outside the arm, and no other link is in its cone up to its reading [m]."""
+    along = np.linspace(0.0, reading, 16)
     others = _distance(p + along[:, None] * beam, body)[:, body.link != link]
     outside = float(_distance(p[None], body).min()) >= 0.5 * _ABOVE
     return outside and bool(np.all(others > along[:, None] * np.tan(PAPER_SENSOR.angle / 2)))
@@ -160,7 +160,7 @@ def _sees_past(body: Capsules, link: int, p: FloatArray, beam: FloatArray, seen:
 def _crossing(
     origin: FloatArray, beam: FloatArray, centers: FloatArray, radius: float
 ) -> tuple[FloatArray, FloatArray]:
-    """How far along rays their points nearest to the centres lie (k, S) [m], and the half chords there, squared."""
+    """Return the distances along rays to the points nearest to centres (k, S) [m], and the squared half chords there."""
     to = centers - origin[:, None]
     along = (to * beam[:, None]).sum(-1)
     return along, radius**2 - (to * to).sum(-1) + along**2

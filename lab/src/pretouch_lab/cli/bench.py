@@ -1,4 +1,4 @@
-"""`pretouch bench`. What each benchmark does stands in `benchmarks`, its options and their help in `options`."""
+"""`pretouch bench`; `benchmarks` runs each benchmark, and `options` has the options and their help."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -10,7 +10,7 @@ from pretouch_lab import options
 
 @dataclass(frozen=True)
 class Bench:
-    """Measure something: detectors, ways to avoid people, places of contacts, or a step's time."""
+    """Run a benchmark: detectors, avoidance of people, places of contacts, or the time of a step."""
 
     what: (
         Annotated[options.DetectionOptions, tyro.conf.subcommand("detection")]
@@ -24,9 +24,9 @@ class Bench:
     )
 
     def run(self) -> None:
-        """Run the benchmark, and write its numbers if a file is given."""
+        """Run the benchmark, and write its numbers to --json."""
         from pretouch.cli.writing import numbers_to
-        from pretouch_lab.cli import benchmarks  # heavy packages, which the help does without
+        from pretouch_lab.cli import benchmarks  # heavy packages, which the help does not need
 
         with numbers_to(self.what.json) as write:
             write(getattr(benchmarks, type(self.what).__name__.removesuffix("Options").lower())(self.what))

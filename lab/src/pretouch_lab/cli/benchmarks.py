@@ -1,4 +1,4 @@
-"""What the benchmarks of `pretouch bench` do: play what is missing, show and write tables, and return the numbers."""
+"""Benchmarks of `pretouch bench`: play missing trials, print and write tables, and return the numbers."""
 
 import sys
 from dataclasses import fields
@@ -42,7 +42,7 @@ from pretouch_lab.run import Row, plays_of
 
 
 def _folder(options: lab_options.Published, name: str, **more: Any) -> Path:
-    """Make the folder of a published benchmark's results, or take up one that a run with the same options began."""
+    """Create the folder for a published benchmark's results, or continue one of a run with the same options."""
     world = options.world if isinstance(options, lab_options.InWorlds) else ""
     out = options.folder(f"bench-{name}{folder_part(world)}{'-quick' if options.quick else ''}")
     scenarios = sha256(repr(sorted(checksums().items())).encode()).hexdigest()
@@ -56,7 +56,7 @@ def _folder(options: lab_options.Published, name: str, **more: Any) -> Path:
 def _finished(
     options: lab_options.Published, name: str, out: Path, tables: list[TextTable], text: str = "", **numbers: Any
 ) -> dict[str, Any]:
-    """Show tables and write them with a text; return the numbers with what they say of the run."""
+    """Print tables and write them with a text; return the numbers with the options of the run."""
     kind, world = "quick" if options.quick else "full", getattr(options, "world", "")
     about = {"bench": name, "version": __version__, "quick": options.quick, "seeds": options.seeds}
     report(tables, [], out, f"Version {__version__}, {options.seeds} seeds, {kind} run. {text}\n")
@@ -82,10 +82,10 @@ def avoidance(options: lab_options.AvoidanceOptions) -> dict[str, Any]:
     out = _folder(options, "avoidance", **other)  # a quick run shares its trials with a full one
     trial = partial(avoiding.trial, options.input(options.world), options.input(options.arm))
     summary = avoiding.summarise(played("avoidance", trial, trials, out, options))
-    shown, cells = avoiding.tables(summary), summary.pop("cells")
+    result_tables, cells = avoiding.tables(summary), summary.pop("cells")
     counts = [cell["trials"] for cell in cells]
     text = f"{min(counts)} to {max(counts)} trials of each contender in each scenario."
-    return _finished(options, "avoidance", out, shown, text, rows=cells, **summary)
+    return _finished(options, "avoidance", out, result_tables, text, rows=cells, **summary)
 
 
 def localization(options: lab_options.LocalizationOptions) -> dict[str, Any]:
@@ -117,7 +117,7 @@ def both(options: lab_options.BothOptions) -> dict[str, Any]:
 def real(options: lab_options.RealOptions) -> dict[str, Any]:
     """See its options."""
     for name in options.detectors:
-        profile(name)  # an hour later would be late
+        profile(name)  # an error now, and not after an hour
     sets, left_out = sets_in(options.sets)
     trials = [({"set": each.name, "detector": name}, 0) for each in sets for name in options.detectors]
     out, folder = options.folder("bench-real"), options.sets.absolute()
@@ -125,9 +125,9 @@ def real(options: lab_options.RealOptions) -> dict[str, Any]:
     for sentence_of_set in left_out:
         print(sentence_of_set, file=sys.stderr)
     rows = played("recordings", partial(recorded.trial, folder), trials, out, options)
-    shown = recorded.tables(rows)
-    report(shown, [], out)
-    return {"sets": {each.name: each.source for each in sets}, "left_out": left_out, "rows": rows, "tables": shown}
+    result_tables, sources = recorded.tables(rows), {each.name: each.source for each in sets}
+    report(result_tables, [], out)
+    return {"sets": sources, "left_out": left_out, "rows": rows, "tables": result_tables}
 
 
 def calibration(options: lab_options.CalibrationOptions) -> dict[str, Any]:
@@ -135,16 +135,16 @@ def calibration(options: lab_options.CalibrationOptions) -> dict[str, Any]:
     if options.skins < 1:
         raise CalibrationError(f"The number of skins is {options.skins}: give at least 1.")
     if options.seed < 0:
-        raise CalibrationError(f"The seed is {options.seed}: it must be at least 0.")
+        raise CalibrationError(f"The seed is {options.seed}: give at least 0.")
     out, model = options.folder("bench-calibration"), RobotModel(robot_named(options.arm))
     described = {"arm": options.arm, "arm_sha256": files_digest(model.description)}
     begin(options, out, {"bench": "calibration", **described, "motion": repr(options.motion)})
     plan = plan_motion(model, options.motion)
     trials = plays_of([{"find_links": options.find_links}], range(options.seed, options.seed + options.skins))
     rows = played("skins", partial(calibrating.trial, options.input(options.arm), plan), trials, out, options)
-    shown = calibrating.tables(rows, plan.duration)
-    report(shown, [], out)
-    return {"rows": rows, "motion_s": plan.duration, "tables": shown}
+    result_tables = calibrating.tables(rows, plan.duration)
+    report(result_tables, [], out)
+    return {"rows": rows, "motion_s": plan.duration, "tables": result_tables}
 
 
 def cycle(options: lab_options.CycleOptions) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""`pretouch demo`, `reproduce` and `figure`: their docstrings are the help. What they do stands in `reproducing`."""
+"""`pretouch demo`, `reproduce` and `figure`: their docstrings are the help, and `reproducing` runs them."""
 
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -11,16 +11,16 @@ from pretouch_lab.options import Playing, TrialOptions
 
 @dataclass(frozen=True)
 class Demo:
-    """Play a small part of the paper's three experiments: blind, as the paper, and as we do it, side by side."""
+    """Play a small part of the paper's three experiments with the profiles blind, paper and pretouch."""
 
     seeds: int = 4
-    """Trials of each cell of the static experiment; the other two take one."""
+    """Trials of each cell of the static experiment; the other two have one."""
     out: str = ""
     """Folder for rows, tables and figures; by default a new one under runs/."""
     json: JsonFile = None
 
     def run(self) -> None:
-        """Play it, with rows, tables and figures."""
+        """Play the trials, and write rows, tables and figures."""
         from pretouch_lab.cli.reproducing import demonstrate
 
         demonstrate(self.seeds, self.out, self.json)
@@ -28,14 +28,14 @@ class Demo:
 
 @dataclass(frozen=True)
 class Reproduce(Playing, TrialOptions):
-    """Run the paper's experiments in full. A run that was stopped goes on where it was, with the same options."""
+    """Run the paper's experiments in full. The same options continue a run that was stopped."""
 
     experiment: tyro.conf.Positional[str] = "all"
-    """static (paper IV-A), avoidance (IV-B), dynamic (IV-C), between (its close-up), one of the studies, or all,
-    which takes about a quarter of an hour on two processors."""
+    """static (paper IV-A), avoidance (IV-B), dynamic (IV-C), between (its close-up), a study, or all. All of them take
+    about a quarter of an hour on two processors."""
 
     def run(self) -> None:
-        """Run the experiments, with rows, recordings, tables and figures."""
+        """Run the experiments, and write rows, recordings, tables and figures."""
         from pretouch_lab.cli.reproducing import reproduce, sentences, whole_paper
         from pretouch_lab.domain_randomisation import folder_part
         from pretouch_lab.experiment import NAMES, check
@@ -50,14 +50,14 @@ class Reproduce(Playing, TrialOptions):
 
 @dataclass(frozen=True)
 class Figure:
-    """Draw one figure of the paper, from trials that are played for it."""
+    """Play the trials of one figure of the paper, and draw it."""
 
     name: tyro.conf.Positional[str]
     """circle (Fig. 4), interaction (Fig. 5), close-up (Fig. 6) or force-difference (Fig. 7)."""
     out: str = ""
     """File to write, ending in .png, .pdf or .svg; by default NAME.png."""
     profile: str = "paper"
-    """Profile that is shown."""
+    """Profile to show."""
     seed: int = 0
     """Seed of the trials."""
 

@@ -1,4 +1,4 @@
-"""`pretouch identify`: from recordings of free motion to a simulated arm like it, as table, figure and file."""
+"""`pretouch identify`: parameters of a simulated arm from a recording of free motion, as table, figure and file."""
 
 from dataclasses import dataclass
 from io import BytesIO
@@ -9,36 +9,36 @@ import tyro
 
 from pretouch.cli.options import JsonFile
 
-if TYPE_CHECKING:  # the help is to need none of the heavy packages
+if TYPE_CHECKING:  # the help must not import heavy packages
     from pretouch.robot.model import RobotModel
     from pretouch_lab.identification.identify import IdentifiedArm
 
 
 @dataclass(frozen=True)
 class Identify:
-    """Estimate an arm's offsets, friction, ripple, masses and noise from free motion, for the simulation to be like it.
+    """Estimate an arm's offsets, friction, ripple, masses and noise from free motion, for a simulation of this arm.
 
-    Nothing may touch the arm; two minutes along smooth paths that turn all joints, below 0.5 m/s, are good. What cannot
-    be identified from the recording keeps its usual value, and the file says so.
+    Nothing may touch the arm. Record about two minutes along smooth paths that turn all joints, below 0.5 m/s. A number
+    that the recording does not determine keeps its default, and the file says so.
     """
 
     file: tyro.conf.Positional[str]
-    """Recording of ours, or .csv with time_s, q1_rad ..., qd1_rad_s ... if there are any, and tau_ext1_Nm ... or
+    """Recording of Pretouch, or .csv with time_s, q1_rad ..., optionally qd1_rad_s ..., and tau_ext1_Nm ... or
     tau1_Nm ... (measured torques, at 400 Hz or more)."""
     arm: str = ""
-    """panda, fr3, or the folder of an arm that `pretouch robot import` wrote; by default what a recording of ours says,
-    or a Panda."""
-    # spelt out: the help is to need none of the heavy packages
+    """panda, fr3, or the folder of an arm from `pretouch robot import`; by default the arm of a recording of Pretouch,
+    else a Panda."""
+    # not imported: the help must not import heavy packages
     sign: Literal["on-robot", "by-robot"] = "on-robot"
-    """Whose the external torques of a CSV file are: on the robot by its environment, or by the robot."""
+    """Sign of the external torques of a CSV file: on the robot by its environment, or by the robot."""
     out: str = ""
-    """TOML file for the arm, for --world of `live`, `reproduce` and `bench`."""
+    """TOML file for the arm, the argument of --world in `live`, `reproduce` and `bench`."""
     figure: str = ""
-    """Figure to write, ending in .png, .pdf or .svg: what is explained over time."""
+    """File for a figure of measured and explained torques over time, ending in .png, .pdf or .svg."""
     json: JsonFile = None
 
     def run(self) -> None:
-        """Identify the arm, and show and write what was found."""
+        """Identify the arm, and print and write the result."""
         from pretouch.atomic_write import atomic_write
         from pretouch.cli.writing import check_writable, numbers_to, unwritable_said
         from pretouch.errors import RecordingError
@@ -51,7 +51,7 @@ class Identify:
 
         out, figure = (Path(text) if text else None for text in (self.out, self.figure))
         if figure and figure.suffix not in (".png", ".pdf", ".svg"):
-            raise RecordingError(f"The figure {figure} has no ending that says its format: use .png, .pdf or .svg.")
+            raise RecordingError(f"The figure {figure} has no known format: end its name in .png, .pdf or .svg.")
         for what, place in (("file", out), ("figure", figure)):
             if place:
                 check_writable(what, place)
@@ -98,9 +98,9 @@ def _show(result: "IdentifiedArm", model: "RobotModel", source: str) -> None:
     else:
         lines.append("Without velocities neither their noise nor the observer's gain is identified.")
     lines.append(
-        "In brackets: the recording hardly tells it, and it stays near what is usual. Errors are standard errors. Of"
-        " the friction only what the robot does not compensate shows. In simulation offsets, ripple and payload were"
-        " off by two and a half times as much."
+        "In brackets: the recording hardly determines the number, and it stays near its default. Errors are standard"
+        " errors. Friction is the part that the robot does not compensate. In simulation the errors of offsets, ripple"
+        " and payload were two and a half times as large as their standard errors."
     )
     for line in lines:
         console.print(line, markup=False)

@@ -1,4 +1,4 @@
-"""Playing from the command line: how far it is, what is kept however it ends, and where tables and figures go."""
+"""Trials from the command line: progress, rows that survive an interruption, and files of tables and figures."""
 
 import os
 import sys
@@ -21,23 +21,23 @@ if TYPE_CHECKING:  # most commands draw nothing
 
 TABLES = "tables.md"
 DrawnFigure = tuple[str, str, "Figure"]
-"""Its name, and what it shows."""
+"""Name, caption and figure."""
 
 
 @contextmanager
 def bar(name: str, total: int, done: int = 0) -> Iterator[Callable[[], None]]:
-    """Show a bar with the time it took and still takes; give what moves it on by a piece of work."""
+    """Show a progress bar with elapsed and remaining time; yield a function that advances it by one."""
     from rich import progress
 
     columns = progress.TextColumn("{task.description}"), progress.BarColumn(), progress.MofNCompleteColumn()
     times = progress.TimeElapsedColumn(), progress.TimeRemainingColumn()
-    with progress.Progress(*columns, *times, console=Console(stderr=True)) as shown:
-        task = shown.add_task(name, total=total, completed=done)
-        yield lambda: shown.advance(task)
+    with progress.Progress(*columns, *times, console=Console(stderr=True)) as display:
+        task = display.add_task(name, total=total, completed=done)
+        yield lambda: display.advance(task)
 
 
 def played(name: str, trial: Trial, plays: Sequence[Play], out: Path, how: Playing) -> list[Row]:
-    """Play what is missing in a folder, with a bar; say where the rows are if something ends it."""
+    """Play the trials that a folder lacks, with a progress bar; print the place of the rows on an interruption."""
     left = missing(plays, out)
     if not left:
         return run(trial, plays, out)
@@ -48,18 +48,18 @@ def played(name: str, trial: Trial, plays: Sequence[Play], out: Path, how: Playi
     except BaseException as error:
         if not isinstance(error, PretouchError):
             there = f"{len(plays) - missing(plays, out)} of {len(plays)} rows are in {out / ROWS}"
-            print(f"Stopped: {there}; the same command with --out {how.out or out} goes on.", file=sys.stderr)
+            print(f"Stopped: {there}; the same command with --out {how.out or out} continues.", file=sys.stderr)
         raise
 
 
 def begin(how: Playing, out: Path, arguments: Mapping[str, Any]) -> None:
-    """Make a folder for rows, or take one up that a run with the same arguments began, unless --json is in its way."""
+    """Create a folder for rows, or continue one of a run with the same arguments, after a check of --json."""
     check_numbers(how, out)
     open_run(out, arguments)
 
 
 def check_numbers(how: Playing, out: Path) -> None:
-    """Refuse a file for the numbers in the place of one that a run keeps in its folder: none of them ends in .json."""
+    """Raise ExperimentError if --json could overwrite a file of the run: a name in its folder must end in .json."""
     if how.json and str(how.json) != STANDARD_OUTPUT:
         place = how.json.resolve()
         if place.is_relative_to(out.resolve()) and (place.suffix != ".json" or place.name == RUN):
@@ -70,7 +70,7 @@ def check_numbers(how: Playing, out: Path) -> None:
 
 
 def report(tables: list[TextTable], figures: list[DrawnFigure], folder: Path, text: str = "") -> None:
-    """Show tables, and write them with figures into a folder."""
+    """Print tables, and write them with figures into a folder."""
     console, place = Console(highlight=False), folder / TABLES
     show(console, tables)
     with unwritable_said("file", place):

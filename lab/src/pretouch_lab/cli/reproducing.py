@@ -1,4 +1,4 @@
-"""What `pretouch reproduce`, `demo` and `figure` do: play what is missing, show and write tables and figures."""
+"""Run `pretouch reproduce`, `demo` and `figure`: play missing trials, print and write tables and figures."""
 
 import sys
 from dataclasses import replace
@@ -31,30 +31,30 @@ _STUDIES = {"between": 12, "mounting": 6, "coverage": 4, "two-arms": 3}
 """Studies beside the paper's experiments, each with its number of seeds."""
 _ENDINGS = (".png", ".pdf", ".svg")
 Part = tuple[str, str, TrialOptions]
-"""A folder's name, an experiment, and which of its trials are kept there."""
+"""Name of a folder, an experiment, and the options of its trials in the folder."""
 
 
 def demonstrate(seeds: int, out: str, json: Path | None) -> None:
     """Play a small part of the paper's three experiments."""
     one, many = (TrialOptions(number, profiles=_DEMONSTRATED) for number in (1, seeds))
     check(many, ("static",))
-    # the long trials first, so that the bar moves on in small steps towards the end
+    # the long trials first, so that the bar moves in small steps towards the end
     parts = [("avoidance", "avoidance", one), ("dynamic", "dynamic", one), ("static", "static", many)]
     how = Playing(out or str(new_folder("demo")), json)
-    prepare(profile("pretouch"))  # each worker would compile the same, and the bar would stand still
+    prepare(profile("pretouch"))  # else each worker would compile the same, and the bar would stand still
     reproduce(parts, Path(how.out), how)
 
 
 def new_folder(name: str) -> Path:
-    """Return a folder under runs/ that is not there yet."""
+    """Return a new folder's name under runs/."""
     return next(path for n in count(1) if not (path := Path("runs") / f"{name}-{n}").exists())
 
 
 def whole_paper(options: TrialOptions) -> list[Part]:
     """Return all parts of `pretouch reproduce all`.
 
-    A study has no more seeds than `options`, nor than its own number. Profiles, restrictions and stiffnesses that are
-    given replace those of the paper's three experiments; where they are the defaults, these are varied as well.
+    A study has at most the seeds of `options`, and at most its own number. Other profiles and stiffnesses than the
+    defaults replace those of the paper's three experiments; the defaults are extended by further values.
     """
     profiles = _PROFILES if options.profiles == TrialOptions.profiles else options.profiles
     stiffness = _STIFFNESS if options.stiffness == TrialOptions.stiffness else options.stiffness
@@ -68,7 +68,7 @@ def whole_paper(options: TrialOptions) -> list[Part]:
 
 
 def sentences(options: TrialOptions) -> list[str]:
-    """Say what is assumed of another arm."""
+    """Return sentences on the assumptions for another arm than the Panda."""
     if not options.arm:
         return []
     context = context_of(options.arm, options.skin, options.world)
@@ -77,7 +77,7 @@ def sentences(options: TrialOptions) -> list[str]:
 
 
 def reproduce(parts: list[Part], folder: Path, how: Playing) -> None:
-    """Play the parts of a run that are not there yet, and show and write tables and figures of all of them."""
+    """Play the missing trials of all parts, and print and write tables and figures of all rows."""
     for _, name, options in parts:
         check(options, (name,))
     plays = [experiment(name).plays(options) for _, name, options in parts]
@@ -97,7 +97,7 @@ def reproduce(parts: list[Part], folder: Path, how: Playing) -> None:
 
 
 def _figure_of(where: str, name: str, options: TrialOptions, folder: Path, rows: list[Row]) -> list[DrawnFigure]:
-    """Draw a part's figure of the recordings of its first seed, if it has one and they can be read."""
+    """Draw a part's figure from the recordings of seed 0, if it has a figure and they can be read."""
     what = experiment(name)
     names = list(what.cells(options)[0])
     if what.drawing is None or where == "restrictions":
@@ -117,7 +117,7 @@ def _figure_of(where: str, name: str, options: TrialOptions, folder: Path, rows:
 
 
 def draw_figure(name: str, out: Path, profile_name: str = "paper", seed: int = 0) -> None:
-    """Draw one of the paper's figures into a file; whatever is wrong is said before anything is played."""
+    """Draw one of the paper's figures into a file; all errors of the arguments come before the first trial."""
     drawings = {own.drawing.name: (own, own.drawing) for own in map(experiment, NAMES) if own.drawing}
     if name not in drawings:
         raise ExperimentError(f"The figure {name!r} is unknown: choose from {', '.join(drawings)}.")
@@ -127,7 +127,7 @@ def draw_figure(name: str, out: Path, profile_name: str = "paper", seed: int = 0
     if profile(profile_name).perception is None and drawing.beside:
         raise ExperimentError(f"The figure {name} cannot show {profile_name}, which has no proximity: name another.")
     if out.suffix not in _ENDINGS:
-        raise ExperimentError(f"The figure {out} has no ending that says its format: use {', '.join(_ENDINGS)}.")
+        raise ExperimentError(f"The figure {out} has no known format: end its name in {', '.join(_ENDINGS)}.")
     check_writable("figure", out)
     console, context, traces = Console(stderr=True, highlight=False, soft_wrap=True), context_of("", "", ""), []
     for cell in drawing.cells(what.cells(TrialOptions(profiles=(*drawing.beside, profile_name)))):

@@ -1,4 +1,4 @@
-"""`pretouch sweep`: any parameters of an experiment, with a table, indices and a figure."""
+"""`pretouch sweep`: vary parameters of an experiment, and write a table, indices and a figure."""
 
 import csv
 import sys
@@ -14,9 +14,9 @@ from pretouch_lab.options import Playing, SweepOptions
 
 @dataclass(frozen=True)
 class Sweep(Playing, SweepOptions):
-    """Vary parameters of an experiment, and say which matter: over a grid, or by Sobol indices.
+    """Vary parameters of an experiment over a grid, or compute their Sobol indices.
 
-    A run that was stopped goes on with the same command. Needs the extra `sweep`.
+    The same command continues a run that was stopped. It needs the extra `sweep`.
     """
 
     vary: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
@@ -24,10 +24,10 @@ class Sweep(Playing, SweepOptions):
     NAME is GROUP.FIELD of the profile, plant.FIELD, plant.kind, plant.world (a set of docs/how-to/sim-to-real.md),
     sensing.FIELD, skin.units or scene.FIELD. Give the option as often as there are parameters."""
     fix: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
-    """Parameter that has another value throughout: NAME=VALUE."""
+    """Parameter with a fixed value in all cells: NAME=VALUE."""
 
     def run(self) -> None:
-        """Play what is missing, with tables and figure."""
+        """Play the missing cells, and write tables and figure."""
         from pretouch import __version__
         from pretouch.cli.writing import numbers_to, unwritable_said
         from pretouch_lab.cli.playing import begin, played, report
@@ -48,7 +48,7 @@ class Sweep(Playing, SweepOptions):
             begin(self, out, {"sweep": sweep.experiment, "profile": sweep.profile, "worlds_sha256": worlds})
             rows = played("sweep", partial(trial, sweep.experiment, sweep.profile), plays, out, self)
             for reason, count in Counter(row["failed"] for row in rows if row["failed"]).items():
-                again = "Take their lines out of rows.jsonl to try again."
+                again = "Remove their lines from rows.jsonl to try again."
                 print(f"{count} cells failed: {reason} {again}", file=sys.stderr)
             results, place = results_of(sweep, rows, metrics), out / f"{sweep.experiment}.csv"
             figures = [(sweep.experiment, "Sobol indices", sobol_figure(results))] if sweep.design == "sobol" else []
@@ -62,7 +62,7 @@ class Sweep(Playing, SweepOptions):
             write(about | {"vary": vary, "fixed": fix, "results": results})
 
     def _pairs(self, option: str, texts: tuple[str, ...]) -> dict[str, str]:
-        """Read NAME=TEXT, each name once; files of worlds as workers elsewhere may read them."""
+        """Read NAME=TEXT, each name once; paths of worlds become absolute for workers elsewhere."""
         pairs: dict[str, str] = {}
         for text in texts:
             name, equals, value = text.partition("=")
