@@ -32,11 +32,11 @@ FILTERS: dict[str, Profile] = {
 }
 """`none` senses and reacts to contacts like `pretouch`, but limits only the joints."""
 SCENES = ("walking", "srdo", "drdo", "inside")
-"""Scenarios of `bench avoidance` with motion: a person walks up, an obstacle passes over a standing arm or into the path
-of a moving one, a hand is put into the path and withdrawn."""
+"""Scenarios of `bench avoidance` with motion: a person walks up, an obstacle passes over a standing arm or into the
+path of a moving one, a hand is put into the path and withdrawn."""
 SEEN_S = 0.4
-"""Time before a contact in which the touching part must be in view [s]: latency and the time in which a row tightens from
-the fastest approach on the braking curve (0.06 s + 0.8 / 3 s), and two readings."""
+"""Time before a contact in which the touching part must be in view [s]: latency and the time in which a row tightens
+from the fastest approach on the braking curve (0.06 s + 0.8 / 3 s), and two readings."""
 SAME_M = 0.1
 """Largest distance of a sensed point's closest point from the touching place of the arm [m]."""
 TOLERANCE = 1e-9
@@ -50,7 +50,7 @@ _DRIVE_1_S = 50.0
 
 
 def speed_bound(mistaken: float) -> float:
-    """Bound on the speed of a touching point along the normal [m/s], if its distance was overestimated by `mistaken` [m].
+    """Bound on the normal speed of a touching point [m/s] whose distance was overestimated by `mistaken` [m].
 
     It is the braking curve of the profile `pretouch` at that distance, the touch speed without a mistake, and the error
     of the drives. A critically damped impedance of w = 50 rad/s (3000 Nm/rad, 1.2 kg m^2) follows a step a of the
@@ -277,12 +277,12 @@ def tables(groups: list[Row]) -> list[TextTable]:
     """Return the table of `results`."""
     note = (
         "Limits broken: steps that exceed a limit of position, velocity or acceleration by more than"
-        f" {TOLERANCE:g}, or are NaN. seen: in each step of the {SEEN_S:g} s before the touch the controller had a point"
-        f" whose closest point on the body was within {100 * SAME_M:.0f} cm of the touching place. The bound is the"
-        " speed on the braking curve at the overestimate of the distance, plus the error of the drives:"
-        f" {speed_bound(0.01):.2f} m/s at 1 cm, {speed_bound(0.02):.2f} at 2 cm, {speed_bound(0.05):.2f} at 5 cm. unseen:"
-        " no filter can prevent these touches. least: least true distance. off: rms distance of the hand from the goal"
-        " of the ordinary commander. change: rms difference of the velocities of the end-effector before and after the"
-        " filter."
+        f" {TOLERANCE:g}, or are NaN. seen: in each step of the {SEEN_S:g} s before the touch the controller had a"
+        f" point whose closest point on the body was within {100 * SAME_M:.0f} cm of the touching place. The bound is"
+        " the speed on the braking curve at the overestimate of the distance, plus the error of the drives:"
+        f" {speed_bound(0.01):.2f} m/s at 1 cm, {speed_bound(0.02):.2f} at 2 cm, {speed_bound(0.05):.2f} at 5 cm."
+        " unseen: no filter can prevent these touches. least: least true distance. off: rms distance of the hand from"
+        " the goal of the ordinary commander. change: rms difference of the end-effector's velocities before and after"
+        " the filter."
     )
     return [table("What holds whoever commands, and what it costs", _COLUMNS, groups, note, 2)]

@@ -160,7 +160,7 @@ def _sees_past(body: Capsules, link: int, p: FloatArray, beam: FloatArray, readi
 def _crossing(
     origin: FloatArray, beam: FloatArray, centers: FloatArray, radius: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the distances along rays to the points nearest to centres (k, S) [m], and the squared half chords there."""
+    """Return the distances along rays to the points nearest to centres (k, S) [m], and squared half chords there."""
     to = centers - origin[:, None]
     along = (to * beam[:, None]).sum(-1)
     return along, radius**2 - (to * to).sum(-1) + along**2
