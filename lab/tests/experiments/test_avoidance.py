@@ -1,5 +1,4 @@
 import numpy as np
-import pytest
 from tests.limits import assert_within_limits
 
 from pretouch_lab.experiments import avoidance
@@ -9,29 +8,20 @@ FIRST_OVER_S = 19.0
 """Five seconds after the hand has gone for the first time [s]."""
 
 
-@pytest.fixture(scope="module")
-def trials(context):
+def test_the_arm_slows_for_the_hand_gives_way_and_recovers_and_blind_passes_by(context, panda_model, monkeypatch):
+    monkeypatch.setattr(avoidance, "_DURATION_S", FIRST_OVER_S)
     cell = {name: {"place": "beside", "profile": name, "restrictions": mode} for name, mode in MODES.items()}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(avoidance, "_DURATION_S", FIRST_OVER_S)
-        return {name: avoidance.trial(cell[name], 400, context) for name in cell}
-
-
-def test_the_arm_slows_for_the_hand_gives_way_and_recovers(trials):
-    row, record = trials["paper"]
+    trials = {name: avoidance.trial(cell[name], 400, context) for name in cell}
+    (row, record), (blind, _) = trials["paper"], trials["blind"]
     assert row["least_speed_scale"] < 0.6
     assert row["contact"] is False
-    assert row["least_gap_m"] > trials["blind"][0]["least_gap_m"]
-    assert row["deviation_m"] > 5 * trials["blind"][0]["deviation_m"]
+    assert row["least_gap_m"] > blind["least_gap_m"]
+    assert row["deviation_m"] > 5 * blind["deviation_m"]
     last = record.steps[-1]
     assert last.speed_scale == 1.0
     assert np.linalg.norm(last.ee_position - last.path_position) < 0.02
-
-
-def test_blind_passes_by_without_slowing(trials, panda_model):
-    row, _ = trials["blind"]
-    assert row["least_speed_scale"] == 1.0
-    assert row["deviation_m"] < 0.01
+    assert blind["least_speed_scale"] == 1.0
+    assert blind["deviation_m"] < 0.01
     for _, record in trials.values():
         assert_within_limits(record, panda_model)
 

@@ -19,7 +19,7 @@ def trials(context):
     return {name: (cells[name] | row, record) for name, (row, record) in trials.items()}
 
 
-def test_objects_on_both_sides_narrow_the_band_from_above_and_below(trials):
+def test_objects_on_both_sides_narrow_the_band_from_above_and_below_and_blind_narrows_nothing(trials):
     row, record = trials["paper"]
     assert row["both_lowered"]
     assert row["both_lowered_at_touch"]
@@ -31,9 +31,13 @@ def test_objects_on_both_sides_narrow_the_band_from_above_and_below(trials):
     assert max(t.upper[1] - t.mean[1] for t in armed) > 10.0
     both = [t.obstacle_positive[1] > 0 and t.obstacle_negative[1] > 0 for t in limits]
     assert 0 < row["both_lowered_s"] <= 0.01 * sum(both) + 1e-9
+    row, record = trials["blind"]
+    assert row["contact"]
+    assert not row["both_lowered"]
+    assert all(np.all(s.thresholds.obstacle_positive == 0) for s in record.steps)
 
 
-def test_the_push_is_felt_and_goes_away_from_the_hand(trials):
+def test_the_push_is_felt_and_goes_away_from_the_hand_and_one_that_never_touched_has_no_results(trials, panda_model):
     row, record = trials["paper"]
     assert row["contact"]
     assert row["detected"]
@@ -42,17 +46,8 @@ def test_the_push_is_felt_and_goes_away_from_the_hand(trials):
     hardest = record.true_force[np.linalg.norm(record.true_force, axis=1).argmax()]
     assert hardest[1] > 0.8 * np.linalg.norm(hardest)
 
-
-def test_blind_narrows_nothing(trials, panda_model):
-    row, record = trials["blind"]
-    assert row["contact"]
-    assert not row["both_lowered"]
-    assert all(np.all(s.thresholds.obstacle_positive == 0) for s in record.steps)
     for _, each in trials.values():
         assert_within_limits(each, panda_model)
-
-
-def test_a_push_that_never_touched_has_no_results(trials):
     row = between.results(trials["blind"][1], None)
     assert row["contact"] is row["detected"] is False
     assert row["detection_delay_s"] is row["both_lowered_at_touch"] is None

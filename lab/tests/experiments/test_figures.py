@@ -1,5 +1,4 @@
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -42,51 +41,27 @@ def traces(profile="paper", **changes):
     return [({"profile": profile}, replace(made_trace(), **changes))]
 
 
-@cache
-def drawn():
-    places = [{"trajectory": t, "side": s} for t in ("circle", "line") for s in ("-y", "+y")]
-    pairs = [(place | {"profile": name}, made_trace()) for place in places for name in ("blind", "paper")]
-    figures = {"circle": circle, "interaction": interaction, "close-up": close_up}
-    figures = {name: draw(traces(), UNITS) for name, draw in figures.items()}
-    return figures | {"force-difference": force_difference(pairs, UNITS)}
-
-
 def line(axes, label):
     return next(found for found in axes.lines if found.get_label() == label)
 
 
-@pytest.mark.parametrize("name", ["circle", "interaction", "close-up", "force-difference"])
-def test_every_axis_says_its_unit(name):
-    figure = drawn()[name]
-    said = [figure.get_supxlabel(), figure.get_supylabel()] if figure.get_supxlabel() else []
-    for axes in figure.axes if not said else []:
-        said += [axes.get_ylabel(), *([axes.get_xlabel()] if axes.get_xlabel() else [])]
-    assert said
-    assert all("[" in words for words in said)
-
-
-def test_what_is_near_counts_from_the_end_effector():
+def test_the_circle_tells_free_motion_avoidance_while_something_is_near_the_end_effector_and_recovery():
     # 0.4 m from the end-effector's origin
     assert figures.near(made_trace(), 0.41).nonzero()[0].tolist() == list(range(100, 200))
     assert not figures.near(made_trace(), 0.39).any()
-
-
-def test_the_circle_is_red_while_something_is_sensed_and_green_until_it_is_free():
-    plane = drawn()["circle"].axes[0]
-    shown = {
-        name: np.flatnonzero(np.isfinite(line(plane, name).get_xdata())) for name in ("free", "avoidance", "recovery")
-    }
-    assert shown["avoidance"].tolist() == list(range(100, 200))
-    assert shown["recovery"].tolist() == list(range(200, 250))
-    assert shown["free"].tolist() == [*range(100), *range(250, S)]
+    (plane, *_) = circle(traces(), UNITS).axes
+    free, avoidance, recovery = (
+        np.flatnonzero(np.isfinite(line(plane, name).get_xdata())).tolist()
+        for name in ("free", "avoidance", "recovery")
+    )
+    assert (avoidance, recovery) == (list(range(100, 200)), list(range(200, 250)))
+    assert free == [*range(100), *range(250, S)]
     objects = line(plane, "sensed objects")
     assert set(zip(objects.get_xdata(), objects.get_ydata(), strict=True)) == {(0.6, 0.3)}
-    assert line(plane, "avoidance").get_color() == "tab:red"
-    assert line(plane, "recovery").get_color() == "tab:green"
 
 
-def test_the_interaction_shades_slowed_and_touched_spans_and_names_the_push():
-    top, middle, bottom = drawn()["interaction"].axes
+def test_the_interaction_shades_slowed_and_touched_spans_and_a_close_up_without_a_touch_shows_all():
+    top, middle, bottom = interaction(traces(), UNITS).axes
     for axes in (top, middle, bottom):
         spans = {patch.get_label(): (patch.get_x(), patch.get_width()) for patch in axes.patches}
         assert spans["slowed"] == pytest.approx((1.0, 1.5))
@@ -94,23 +69,19 @@ def test_the_interaction_shades_slowed_and_touched_spans_and_names_the_push():
     assert [text.get_text() for text in middle.texts] == ["pushed +y"]
     assert line(top, "activation, d_max 0.8 m").get_ydata() == [0.8, 0.8]
     assert line(middle, "detected").get_xdata() == pytest.approx([3.05])
-
-
-def test_the_close_up_of_a_trace_without_a_touch_shows_all_of_it():
     assert close_up(traces(truth=None), UNITS).axes[1].get_xlim() == (0.0, 3.99)
 
 
 def test_the_force_difference_counts_from_the_touch_away_from_the_object():
-    against, along = (drawn()["force-difference"].axes[i] for i in (1, 0))
+    sides, names = ("-y", "+y"), ("blind", "paper")
+    cells = [{"trajectory": "circle", "side": side, "profile": name} for side in sides for name in names]
+    along, against, *_ = force_difference([(cell, made_trace()) for cell in cells], UNITS).axes
     for axes, sign in ((along, 1.0), (against, -1.0)):
         estimate = line(axes, "blind: estimate")
         assert estimate.get_xdata()[300] == 0.0
         assert estimate.get_ydata()[300] == sign * 20.0
         assert line(axes, "paper: detected").get_xdata() == pytest.approx([0.05])
     assert force_difference([], UNITS).axes[0].lines[:] == []
-    alone = force_difference([({"trajectory": "circle", "side": "-y", "profile": "blind"}, made_trace())], UNITS)
-    assert alone.get_suptitle().endswith("thresholds, blind")
-    assert len(alone.axes[0].get_legend_handles_labels()[1]) <= 4
 
 
 def test_a_figure_is_written_here_by_its_name_of_trials_that_are_played_and_told(tmp_path, monkeypatch, capsys):

@@ -7,21 +7,10 @@ from pretouch_lab.experiments.static import shown_controllers
 
 
 def static_row(profile, seed, peak, **changes):
-    return {
-        "trajectory": "circle",
-        "side": "-y",
-        "stiffness_n_per_m": 25e3,
-        "profile": profile,
-        "restrictions": "off",
-        "seed": seed,
-        "contact": True,
-        **dict.fromkeys(static.MEASURES, 40.0),
-        "impact_speed_m_s": 0.2,
-        "detection_delay_s": 0.05,
-        "peak_estimate_n": peak,
-        "least_sensed_m": 0.05,
-        "false_detections": 0,
-    } | changes
+    row = {"trajectory": "circle", "side": "-y", "stiffness_n_per_m": 25e3, "profile": profile, "restrictions": "off"}
+    row |= {"seed": seed, "contact": True, **dict.fromkeys(static.MEASURES, 40.0), "impact_speed_m_s": 0.2}
+    row |= {"detection_delay_s": 0.05, "peak_estimate_n": peak, "least_sensed_m": 0.05, "false_detections": 0}
+    return row | changes
 
 
 def missed(profile, seed, **changes):
@@ -56,11 +45,8 @@ def test_modes_are_a_table_of_their_own():
     made = static.tables(rows)
     forces, _, by_mode = made
     assert [row[0].split("\n")[0] for row in forces.rows] == ["blind", "paper", "slowing-only"]
-    assert [row[:2] for row in by_mode.rows] == [
-        ("paper\noff", "1/1"),
-        ("slowing-only\noff", "1/1"),
-        ("paper\nhard", "0/1"),
-    ]
+    modes = [("paper\noff", "1/1"), ("slowing-only\noff", "1/1"), ("paper\nhard", "0/1")]
+    assert [row[:2] for row in by_mode.rows] == modes
     for table in made:
         assert width(table) <= 80
         assert all(len(row) == len(table.header) for row in table.rows)
