@@ -219,6 +219,12 @@ def test_within_a_tolerance_each_snapshot_is_a_new_start(place, tmp_path, monkey
     assert verify(recorded).agrees
 
 
+def test_other_words_of_another_version_are_no_difference(place, tmp_path, monkeypatch):
+    elsewhere(monkeypatch)
+    words = {60: lambda step: replace(step, reason="Stopped by 9 Nm.", detail="9 Nm")}
+    assert verify(open_recording(steps_changed(place, tmp_path / "b.mcap", words))).agrees
+
+
 def test_differences_of_numbers_that_are_none():
     a = np.array([np.nan, np.inf, -0.0, 1.0, np.nan, 1e9])
     b = np.array([np.nan, -np.inf, 0.0, 1.0, 2.0, 1e9 + 1])

@@ -45,11 +45,11 @@ class ArmParams(Checked):
     """An arm behind topics."""
 
     sign: Sign
-    """True if the wrench is on the robot by the environment, as ours, or by the robot, as Franka's O_F_ext_hat_K."""
+    """Sign of the wrench: on the robot by the environment, as ours, or by the robot, as Franka's O_F_ext_hat_K."""
     frame: Frame
     """Frame the wrench is given in: the arm's base or its end-effector."""
     zeros: Zeros = "auto"
-    """True if a wrench of six zeros only means that there is no estimate; auto: where the force is by the robot."""
+    """Meaning of a wrench of six zeros: no estimate, or no force; auto: no estimate where the force is by the robot."""
     joint_states: str = "/joint_states"
     """Topic of sensor_msgs/JointState."""
     joint_names: tuple[str, ...] = ()

@@ -31,12 +31,12 @@ class Choice:
     """Facts that a log does not contain: options of `pretouch detect`."""
 
     sign: Literal["auto", "on-robot", "by-robot"] = "auto"
-    """True if force and external torques are on the robot (by its environment) or by the robot, as Franka's
+    """Sign of force and external torques: on the robot (by its environment), or by the robot, as Franka's
     O_F_ext_hat_K; auto: on the robot, but for torques by the name tau_ext_hat_filtered."""
     frame: Literal["base", "ee"] = "base"
     """Frame of the force; ee, the end-effector's, needs joint positions of a Panda or FR3."""
     zeros: Literal["auto", "missing", "kept"] = "auto"
-    """True if six zeros mean no estimate; auto: yes with --sign by-robot."""
+    """Meaning of six zeros: a missing estimate, or a force of zero; auto: missing with --sign by-robot."""
     wrench: str = ""
     """Topic of the force, if there are several."""
     joints: str = ""

@@ -1,4 +1,4 @@
-"""The web server of a page: for this machine alone by default, at a fixed port, and quiet."""
+"""The web server of a page: for this machine alone by default, at the port of its options, and quiet."""
 
 import errno
 import ipaddress

@@ -261,7 +261,7 @@ class NullSpaceMotion(Checked):
     distance_m: Positive = 0.25
     """Body distance below which they move away [m]."""
     speed_m_s: Positive = 0.1
-    """Speed of the closest point at a distance of 0; it falls with the square of the distance [m/s]."""
+    """Speed of the closest point at a distance d of 0 [m/s]; it falls by the square of 1 - d / `distance_m`."""
     joint_rad_s: Positive = 0.5
     """Largest norm of these joint velocities [rad/s]."""
     rate_rad_s2: Positive = 1.0

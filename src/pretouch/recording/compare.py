@@ -21,7 +21,7 @@ SAME_CONTACT_S = 0.3
 """Two detectors' contacts within this time of each other [s] are one."""
 
 Decision = tuple[float, FloatArray, FloatArray, Thresholds, bool, bool, Contact | None]
-"""Decision of a cycle: its instant [s], the force (3,) and the force less its mean (3,) [N], the thresholds,
+"""Decision of a cycle: its instant [s], the force (3,) and the one compared with thresholds (3,) [N], these,
 whether the force window was full, whether a reaction was under way, and the contact that began."""
 
 

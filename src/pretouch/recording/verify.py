@@ -20,8 +20,8 @@ TOLERANCE = 1e-6
 """Largest difference of a number, in its SI unit, that other versions or another machine may make. Of numbers beyond 1
 in size it is that part of them."""
 
-_SENTENCES = frozenset({"reason", "status"})
-"""Texts with numbers in them, which rounding may change: compared only where all has to be the same."""
+_SENTENCES = frozenset({"reason", "detail", "status"})
+"""Texts with numbers in them, which rounding may change, and words, which versions may: compared only exactly."""
 
 
 @dataclass(frozen=True)

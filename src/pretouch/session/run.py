@@ -1,4 +1,4 @@
-"""Motion of the arm: slowly to the start of its path, then under the controller. It always ends at rest."""
+"""Motion of the arm: slowly to the start of its path, then under the controller. Each end tries to bring it to rest."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -55,7 +55,7 @@ class Ending:
         return bool(self.stopped or self.rest_unknown)
 
     def failed(self, arm: Arm, error: Exception) -> None:
-        """Note an error after which the arm may move, and check whether it is at rest."""
+        """Note an error after which the arm may still move, and check whether it is at rest."""
         self.stopped = self.stopped or error_text(error)
         self.rest_unknown = "" if _is_at_rest(arm) else error_text(error)
 

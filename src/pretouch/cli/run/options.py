@@ -31,7 +31,7 @@ class RobotOptions:
 
 @dataclass(frozen=True)
 class UnitOptions:
-    """Address that the sensor units send to."""
+    """Keys of the sensor units, and the address to receive them at."""
 
     keys: OptionalFile = None
     """File of the keys of units that are received over the network; without it, the arm's own or simulated ones."""
