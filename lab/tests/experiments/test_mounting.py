@@ -24,7 +24,7 @@ def test_cells_are_all_errors_at_all_places_of_each_profile_that_senses():
     cells = mounting.cells(TrialOptions())
     assert {cell["profile"] for cell in cells} == {"paper"}
     off = [cell for cell in cells if cell["restrictions"] == "off" and cell["told"] == "untold"]
-    assert len(off) == 6 * len(mounting.UNTOLD)
+    assert len(off) == 6 * len(mounting.UNDECLARED)
     positions, angles = [(size, 0) for size in (5, 10, 20, 50)], [(0, size) for size in (1, 2, 5, 20)]
     assert {(cell["position_mm"], cell["orientation_deg"]) for cell in off} == {(0, 0), *positions, *angles, (3, 0.5)}
     assert {cell["side"] for cell in cells if cell["restrictions"] == "hard"} == {"-y", "+y"}

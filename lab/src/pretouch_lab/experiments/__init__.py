@@ -1,1 +1,1 @@
-"""Experiments: one question, one file, which says what is played, what is measured, its tables and its figure."""
+"""Experiments: each file has the cells, the trial, the measures, the tables and the figure of one question."""

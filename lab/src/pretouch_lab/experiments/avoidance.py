@@ -1,4 +1,4 @@
-"""Paper IV-B: a person holds a hand beside the circle or into it, on one side and then on the other."""
+"""Paper IV-B: a person holds a hand beside the circle or in it, on one side and then on the other."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -22,11 +22,11 @@ from pretouch_lab.trial import Record, play
 _DURATION_S = 40.0
 _VISITS_S = ((4.0, 14.0), (20.0, 30.0))
 PLACES = ("beside", "inside")
-"""Where the person's hand is: 3 cm clear of the robot's on the free circle, or half of it in its way."""
+"""Places of the person's hand: 3 cm clear of the robot's hand on the free circle, or half in its path."""
 _SPREAD_M = 0.03
 _UNMOVED = Placement()
 _CLEAR_M = 0.4
-"""Distance of the robot's hand at which a person dares to come in [m]."""
+"""Least distance of the robot's hand at which the person enters [m]."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Visit:
 
 @dataclass
 class Visitor:
-    """Holds a hand up beside the path, then takes it away. Comes in while the robot's hand is elsewhere."""
+    """A person who holds a hand beside the path and withdraws it, and enters only while the robot's hand is away."""
 
     model: RobotModel
     visits: tuple[Visit, ...]
@@ -53,7 +53,7 @@ class Visitor:
         self._inside = False
 
     def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
-        """Be at the place of the visit under way, or at home; come and go from the far side of the place."""
+        """Return the place of the present visit, or home; the hand enters and leaves from the far side."""
         for visit in self.visits:
             if visit.arrive - LEAD_S <= time < visit.leave + 1.0:
                 outside = visit.place + np.array([0.0, np.sign(visit.place[1]) * 0.4, 0.0])
@@ -66,12 +66,12 @@ class Visitor:
 
 
 def cells(options: TrialOptions) -> list[Row]:
-    """A cell for each place of the hand and each controller."""
+    """Return a cell for each place of the hand and each controller."""
     return [{"place": place, **controller} for place, controller in product(PLACES, controllers(options, "slack"))]
 
 
 def visits(place: str, seed: int, placement: Placement = _UNMOVED) -> tuple[Visit, ...]:
-    """One visit on each side of the circle, at a place that the seed varies by a few centimetres."""
+    """Return a visit on each side of the circle, at a place that the seed varies by a few centimetres."""
     rng = np.random.default_rng([seed, 12])
     return tuple(
         Visit(arrive, leave, np.array(placement.visited(place, side)) + _SPREAD_M * rng.uniform(-1, 1, 3))
@@ -80,7 +80,7 @@ def visits(place: str, seed: int, placement: Placement = _UNMOVED) -> tuple[Visi
 
 
 def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
-    """Run one trial; return what is measured and what it left behind."""
+    """Run one trial; return its row and its record."""
     where = context.placement
     person = Visitor(context.model, visits(cell["place"], seed, where))
     setup = context.setup(cell, seed, SceneSpec(hand=HandSpec()), where.path("circle", -1.0), hand=person)
@@ -104,7 +104,7 @@ def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
 
 
 def gaps(record: Record, model: RobotModel, radius: float) -> FloatArray:
-    """Distance (S,) [m] between the person's hand, a ball of a radius [m], and the arm at each control step."""
+    """Return the distance (S,) [m] of the person's hand, a ball of a radius [m], from the arm at each control step."""
     unit, aside = np.zeros(1, np.int64), np.array([[0.0, 0.0, 1.0]])
     distances = [
         closest_points(model.kinematics(step.q), model.body, step.ee_position, unit, hand[None], aside).body_distance[0]
@@ -127,18 +127,18 @@ _COLUMNS = (
 
 
 def tables(rows: list[Row]) -> list[TextTable]:
-    """Show what a hand beside the path or in it changes."""
+    """Return a table of the effects of a hand beside the path or in it."""
     note = (
-        "Beside is 3 cm clear of the robot's hand on its free path, inside half of the person's hand is in its way."
+        "Beside: the person's hand is 3 cm clear of the robot's hand on its path. Inside: half of it is in the path."
         " Contact: trials with contact. True: peak of the true force. Gap: between the person's hand and the arm,"
-        " negative in contact. Least speed: factor of eqs. 3 and 4. Way: travelled along the path in 40 s."
+        " negative in contact. Least speed: factor of eqs. 3 and 4. Way: distance along the path in 40 s."
     )
-    title = "A person holds a hand beside the path or into it: medians"
+    title = "A person holds a hand beside the path or in it: medians"
     return [medians(title, _COLUMNS, rows, ("place", "profile", "restrictions"), note, names=2)]
 
 
 def shown_cells(rows: list[Row]) -> list[Row]:
-    """Choose the trial of the figure: one with the hand beside the path."""
+    """Return the trial of the figure: one with the hand beside the path."""
     return first_sensing([row for row in rows if row["place"] == "beside"])
 
 

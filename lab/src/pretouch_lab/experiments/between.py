@@ -15,35 +15,35 @@ from pretouch_lab.trial import Record, play
 
 _DURATION_S = 12.0
 _REACH_M = 0.25
-"""The circle's end-effector comes this far in y [m]."""
+"""Largest y of the end-effector on the circle [m]."""
 _BEYOND_M = (0.3, 0.4)
-"""Distance of the body's surface from there [m]."""
+"""Range of the distance from there to the body's surface [m]."""
 _BODY_HALF_SIZE_M = (0.2, 0.12, 0.75)
-"""Half the size of a person's trunk and legs [m]; they stand on the floor."""
+"""Half the size of a person's trunk and legs, on the floor [m]."""
 _BODY_STIFFNESS_N_PER_M = 25_000.0
 """Contact stiffness of a chest [N/m] (ISO/TS 15066, annex A)."""
 _ASIDE_M = 0.05
-"""The seed moves the body along x by up to this [m]."""
+"""Largest shift of the body along x by the seed [m]."""
 _START_S = (5.0, 7.0)
-"""When the person reaches for the arm [s]."""
+"""Range of the time at which the person reaches for the arm [s]."""
 _FACE = FACES[0]
-"""The right face of the robot's hand is pushed: along +y of the base."""
+"""Right face of the robot's hand, pushed along +y of the base."""
 _FORCE_N = (15.0, 30.0)
 _LASTING_S = (0.2, 0.5)
 _NOTICE_S = 0.3
-"""A reaction up to this long after the release still answers the push [s]."""
+"""Longest time from the release to a reaction to the push [s]."""
 _REBOUND_S = 3.0
-"""A later reaction up to this long after the release is the push's echo [s]."""
+"""Longest time from the release to a repeated reaction, the push's echo [s]."""
 _Y = 1
 
 
 def cells(options: TrialOptions) -> list[Row]:
-    """A cell for each controller."""
+    """Return a cell for each controller."""
     return controllers(options, "slack")
 
 
 def interaction(seed: int) -> tuple[Box, Push]:
-    """Where the body stands at +y, and how the hand pushes from -y: both vary with the seed."""
+    """Draw the place of the body at +y, and the push of the hand from -y."""
     rng = np.random.default_rng([seed, 61])
     face = _REACH_M + rng.uniform(*_BEYOND_M)
     center = (
@@ -57,7 +57,7 @@ def interaction(seed: int) -> tuple[Box, Push]:
 
 
 def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
-    """Run one trial; return what is measured and what it left behind."""
+    """Run one trial; return its row and its record."""
     body, push = interaction(seed)
     person = Pusher(context.model, (push,))
     setup = context.setup(cell, seed, SceneSpec(boxes=(body,), hand=HandSpec()), Circle(), hand=person)
@@ -73,7 +73,7 @@ def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
 
 
 def results(record: Record, touched: tuple[float, float] | None) -> Row:
-    """Numbers of one trial; `touched` are touch and release [s] of the push, None if it never touched."""
+    """Return the measures of a trial; `touched` is touch and release [s] of the push, None without contact."""
     touch, release = touched or (np.inf, np.inf)
     before = [s for s in record.steps if s.armed and s.stamp < touch]
     lowered = [s for s in before if lowered_on_both_sides(s)]
@@ -94,7 +94,7 @@ def results(record: Record, touched: tuple[float, float] | None) -> Row:
 
 
 def lowered_on_both_sides(step: ControlStep) -> bool:
-    """Whether objects on both sides narrow the band along y from above and from below."""
+    """Return True if objects on both sides narrow the band along y from above and from below."""
     return bool(step.thresholds.obstacle_positive[_Y] > 0 and step.thresholds.obstacle_negative[_Y] > 0)
 
 
@@ -110,10 +110,10 @@ _COLUMNS = (
 
 
 def tables(rows: list[Row]) -> list[TextTable]:
-    """Show in how many trials the band was narrowed from both sides, and which pushes were detected."""
+    """Return a table of the trials with a band narrowed from both sides, and of detected pushes."""
     note = (
-        "Both: trials in which objects narrowed the band along y from above and below at once, ever before the push and"
-        " when it touched. Detected: of the pushes that touched. Filtered (eq. 8): along y, at detection."
+        "Both: trials in which objects narrowed the band along y from above and below at once, at any time before the"
+        " push, and at its touch. Detected: of the pushes that touched. Filtered (eq. 8): along y, at detection."
     )
     title = "A person stands at +y and pushes the arm from -y: medians"
     return [medians(title, _COLUMNS, rows, ("profile", "restrictions"), note)]

@@ -1,6 +1,6 @@
-"""Contacts that no unit saw coming, by simulation: a skin, with suggested units, and with units put anywhere.
+"""Simulated contacts that no unit saw in time: with a skin, with suggested units, and with random units added.
 
-Balls come at the arm as coverage has them come: straight at random points of its surface, from random directions.
+Balls approach the arm as in the coverage measure: straight at random points of its surface, from random directions.
 """
 
 from dataclasses import dataclass, field, replace
@@ -32,41 +32,41 @@ from pretouch_lab.trial import Record, play
 
 SKINS = ("own", "suggested", "random")
 MORE = 8
-"""Units that are added."""
+"""Number of added units."""
 ARMS = {"moving": None, "standing": 0.02}
-"""How fast the hand goes [m/s]; None is the profile's own speed."""
+"""Speed of the hand [m/s]; None: the profile's speed."""
 COUNT = 24
-"""Things that come in a trial."""
+"""Number of balls in a trial."""
 
 _NEAR_M = 0.1
-"""A sensed point so near the ball's surface shows the ball [m]."""
+"""Largest distance of a sensed point of the ball from its surface [m]."""
 _DRIVES_S = 0.016
-"""Time from a command to a motion [s]: the drives' set-point filter (`BrakingParams.latency_s`)."""
+"""Time from a command to the motion [s]: the drives' set-point filter (`BrakingParams.latency_s`)."""
 _POSTURES = 40
 _START_S, _EVERY_S = 2.0, 2.5
-"""When the first one sets out, and how long after it the next [s]."""
+"""Start of the first ball, and time from one ball to the next [s]."""
 PARKED = (0.0, 0.0, -3.0)
-"""Where the ghost is in between: below the floor [m]."""
+"""Place of the ghost between two balls, below the floor (3,) [m]."""
 _BATCH, _BATCHES = 16, 50
 
 
 @dataclass
 class ApproachingObstacle:
-    """One that comes: what was foreseen of it, where it was, and how it met the arm."""
+    """A ball that approaches the arm: its contact point, its track, and the prediction by coverage."""
 
     link: int
     center: FloatArray
     """(3,) centre of the ball at the contact, link frame [m]."""
     way: FloatArray
-    """(3,) unit vector to where it comes from, link frame."""
+    """(3,) unit vector against its motion, link frame."""
     foreseen: bool
-    """Whether coverage says that it is seen in time, with the arm standing as it does when it sets out."""
+    """True if coverage predicts that a unit sees it in time, for the arm's posture at its start."""
     track: dict[int, tuple[float, FloatArray]] = field(default_factory=dict)
-    """Way left [m] and centre (3,) [m] by the number of the physics step."""
+    """Remaining distance [m] and centre (3,) [m] by the number of the physics step."""
 
 
 class ApproachingObstacles:
-    """Moves the ghost of a scene: it follows the link that it comes at, so that they meet whatever the arm does."""
+    """Moves the ghost of a scene: it follows the link of its contact point, so that it meets the arm in any motion."""
 
     def __init__(self, model: RobotModel, skin: Skin, params: CoverageParams, seed: int) -> None:
         self._model, self._skin, self._params = model, skin, params
@@ -94,7 +94,7 @@ class ApproachingObstacles:
         return center
 
     def _drawn(self) -> ApproachingObstacle:
-        """Draw a free way to the arm as it stands."""
+        """Draw a ball with a free way to the arm in its posture."""
         q = self._plant.mj_data.qpos[: self._model.n].copy()
         surface, r = self._model.surface, self._params.object_radius_m
         for _ in range(_BATCHES):
@@ -107,25 +107,25 @@ class ApproachingObstacles:
             link, center = int(surface.link[drawn[i]]), surface.point[drawn[i]] + r * surface.normal[drawn[i]]
             along = ways.postures[0].rotation[link].T @ ways.way[0, i]
             return ApproachingObstacle(link, center, along, bool(sees.any()))
-        raise ExperimentError("Nothing can come at the arm where it stands: make the ways shorter.")
+        raise ExperimentError("No ball has a free way to the arm in its posture: set a shorter way_m.")
 
 
 def cells(options: TrialOptions) -> list[Row]:
-    """A cell for each skin, with the arm on the circle and almost standing, for each profile that senses."""
+    """Return a cell for each skin, with the arm on the circle and almost at rest, for each profile with proximity."""
     sensing = [name for name in options.profiles if profile(name).perception is not None]
     return [{"arm": arm, "skin": skin, "profile": name} for name, arm, skin in product(sensing, ARMS, SKINS)]
 
 
 @lru_cache(maxsize=4)
 def _places(model: RobotModel, skin: Skin) -> tuple[tuple[SensorUnit, ...], tuple[SensorUnit, ...]]:
-    """Return all places for units, and those of them that help most on the circle."""
+    """Return all places for units, and the suggested ones for the circle."""
     ways = CoverageSetting(model, fixtures(SceneSpec()), CoverageParams(), "circle", _POSTURES).ways()
     places = candidates(ways, skin)
     return places, suggest((ways,), skin, MORE, places).units
 
 
 def skin_of(kind: str, model: RobotModel, skin: Skin, seed: int) -> Skin:
-    """Return one of `SKINS`; units put anywhere are others for each seed."""
+    """Return one of `SKINS`; the seed draws random units."""
     if kind == "own":
         return skin
     places, best = _places(model, skin)
@@ -136,7 +136,7 @@ def skin_of(kind: str, model: RobotModel, skin: Skin, seed: int) -> Skin:
 
 
 def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
-    """Run one trial; return what is measured and what it left behind."""
+    """Run one trial; return its row and its record."""
     model, params = context.model, CoverageParams()
     skin = skin_of(cell["skin"], model, context.skin, seed)
     approaching = ApproachingObstacles(model, skin, params, seed)
@@ -157,7 +157,7 @@ def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
 
 
 def results(came: list[ApproachingObstacle], record: Record, params: CoverageParams) -> Row:
-    """Numbers of one trial."""
+    """Return the measures of a trial."""
     points = {round(step.stamp / 0.001): step.obstacles.point for step in record.steps}
     return {
         "came": len(came),
@@ -167,9 +167,9 @@ def results(came: list[ApproachingObstacle], record: Record, params: CoveragePar
 
 
 def seen_in_time(obstacle: ApproachingObstacle, points: dict[int, FloatArray], params: CoverageParams) -> bool:
-    """Whether the controller had a sensed point on the ball while there was still way left to brake.
+    """Return True if the controller had a sensed point on the ball in time to brake.
 
-    `points` (M, 3) [m] are those of each control step, by its number in milliseconds.
+    `points` are the sensed points (M, 3) [m] of each control step, by its time in milliseconds.
     """
     needed = params.braking_m + _DRIVES_S * params.closing_m_s
     for number, (left, center) in obstacle.track.items():
@@ -191,13 +191,13 @@ _COLUMNS = (
 
 
 def tables(rows: list[Row]) -> list[TextTable]:
-    """Show blind contacts by simulation, beside what coverage says."""
+    """Return a table of blind contacts in simulation, beside the prediction by coverage."""
     note = (
-        "A ball comes straight at random points of the surface. Blind: no sensed point within 0.1 m of it while there"
-        " was way left to brake, 95 % bounds below (Clopper and Pearson). Foreseen: what coverage says of the same"
-        " ways, the arm standing as when each set out."
+        "Balls move straight at random points of the surface. Blind: balls without a sensed point within 0.1 m in time"
+        " to brake, 95 % bounds below (Clopper and Pearson). Foreseen: blind balls by coverage on the same ways, for"
+        " the arm's posture at the start of each."
     )
-    title = f"Contacts that no unit saw in time: the skin, with {MORE} suggested units, with {MORE} anywhere"
+    title = f"Contacts that no unit saw in time: the skin, with {MORE} suggested units, with {MORE} random units"
     groups = summary(rows, ("arm", "skin", "profile"), (), ("came", "blind", "foreseen_blind"))
     return [table(title, _COLUMNS, [group | _shares(group) for group in groups], note, names=2)]
 

@@ -16,18 +16,18 @@ from pretouch_lab.trial import Record, play
 
 _DURATION_S = 30.0
 _NOTICE_S = 0.3
-"""A reaction up to this long after the release still answers the push [s]."""
+"""Longest time from the release to a reaction to the push [s]."""
 _REBOUND_S = 3.0
-"""A later reaction up to this long after the release is the push's echo [s]."""
+"""Longest time from the release to a repeated reaction, the push's echo [s]."""
 
 
 def cells(options: TrialOptions) -> list[Row]:
-    """A cell for each controller."""
+    """Return a cell for each controller."""
     return controllers(options, "slack")
 
 
 def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
-    """Run one trial; return what is measured and what it left behind."""
+    """Run one trial; return its row and its record."""
     person, path = Pusher(context.model, dynamic_pushes(seed)), context.placement.path("circle", -1.0)
     setup = context.setup(cell, seed, SceneSpec(hand=HandSpec()), path, hand=person)
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
@@ -52,7 +52,7 @@ def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
 
 
 def _at_detection(reactions: list[ControlStep], spans: list[tuple[float, float]]) -> dict[str, float | None]:
-    """Medians over the pushes that were detected: delay [s], and norms of the filtered and the raw estimate [N]."""
+    """Return medians over detected pushes: delay [s], and norms of the filtered and the raw estimate [N]."""
     reached = [(s, next((a for a, b in spans if a <= s.stamp <= b + _NOTICE_S), None)) for s in reactions]
     rows = [
         (s.stamp - touch, float(np.linalg.norm(s.filtered_force)), float(np.linalg.norm(s.force)))
@@ -65,7 +65,7 @@ def _at_detection(reactions: list[ControlStep], spans: list[tuple[float, float]]
 
 
 def _touched_estimate(record: Record, spans: list[tuple[float, float]]) -> FloatArray:
-    """Norm of the force estimate [N] in the control steps of the pushes, without those that have none."""
+    """Return the norms of the force estimate [N] in the control steps of the pushes, NaN left out."""
     steps = [s for s in record.steps if any(a <= s.stamp <= b for a, b in spans)]
     size = np.array([np.linalg.norm(s.force) for s in steps])
     return size[np.isfinite(size)]
@@ -74,7 +74,7 @@ def _touched_estimate(record: Record, spans: list[tuple[float, float]]) -> Float
 def _contact(
     record: Record, beginnings: list[tuple[ControlStep, FloatArray]], push: Push, touched: tuple[float, float] | None
 ) -> Row:
-    """Judge how the arm answered one push."""
+    """Return the measures of the reaction to one push."""
     row: Row = {
         "detected": False,
         "delay_s": None,
@@ -123,15 +123,15 @@ _COLUMNS = (
 
 
 def tables(rows: list[Row]) -> list[TextTable]:
-    """Show how the arm answered the pushes, those of all trials together."""
+    """Return a table of the reactions to the pushes of all trials."""
     by = ("profile", "restrictions")
     pushes = [row | contact | {"pushes": 1} for row in rows for contact in row["contacts"]]
     counts = ("pushes", "detected", "reaction_towards_person")
     of_pushes = summary(pushes, by, ("delay_s", "direction_error_deg"), counts)
     of_trials = summary(rows, by, ("peak_estimate_n",), ("false_detections",))
     note = (
-        "Pushes of 15 to 30 N for 0.2 to 0.5 s. Direction: between reaction and true force. Peak: of the estimate."
-        " Towards person: pushes after which a reaction began against the push."
+        "Pushes of 15 to 30 N for 0.2 to 0.5 s. Direction: angle from true force to reaction. Peak: of the estimate."
+        " Towards person: pushes with a reaction that began against the push."
     )
     groups = [one | other for one, other in zip(of_pushes, of_trials, strict=True)]
     return [table("A person pushes the moving arm: medians", _COLUMNS, groups, note)]

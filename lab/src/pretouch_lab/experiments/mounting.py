@@ -1,4 +1,4 @@
-"""The static experiment with units that sit elsewhere than the skin file says: how good is good enough."""
+"""The static experiment with misplaced units: required accuracy of their mounting."""
 
 from itertools import product
 
@@ -18,25 +18,25 @@ from pretouch_lab.table import Column, medians, ratios, rounded
 from pretouch_lab.trial import Record, play
 
 ROOM = "room"
-"""In place of the board's side: an empty room."""
+"""Value in place of the board's side: an empty room."""
 _CALIBRATED = (3.0, 0.5)
-"""What a calibration by the units' IMUs may leave [mm], [deg]."""
+"""Errors after a calibration by the units' IMUs [mm], [deg]."""
 _LARGE = ((50.0, 0.0), (0.0, 20.0))
-UNTOLD = (
+UNDECLARED = (
     Misplacement(),
     *(Misplacement(position_mm=size) for size in (5.0, 10.0, 20.0, 50.0)),
     *(Misplacement(orientation_deg=size) for size in (1.0, 2.0, 5.0, 20.0)),
     Misplacement(*_CALIBRATED),
 )
-TOLD = tuple(Misplacement(*both, declared=True) for both in (_CALIBRATED, *_LARGE))
+DECLARED = tuple(Misplacement(*both, declared=True) for both in (_CALIBRATED, *_LARGE))
 AVOIDED = (Misplacement(), *(Misplacement(*both) for both in _LARGE))
-"""These once more with restrictions that keep the arm off the board."""
+"""Misplacements that are also played with restrictions that keep the arm off the board."""
 _STIFFNESS_N_PER_M = 25_000.0
 _ROOM_S = 20.0
 
 
 def cells(options: TrialOptions) -> list[Row]:
-    """All places of the board and both paths in an empty room with each misplacement, for each profile that senses."""
+    """Return all places of the board, and an empty room, with each misplacement, for each profile with proximity."""
     every = [
         {
             "trajectory": trajectory,
@@ -47,7 +47,7 @@ def cells(options: TrialOptions) -> list[Row]:
             **controller,
         }
         for mode, errors, sides in (
-            (static.DEFAULT_RESTRICTIONS, (*UNTOLD, *TOLD), (*static.SIDES, ROOM)),
+            (static.DEFAULT_RESTRICTIONS, (*UNDECLARED, *DECLARED), (*static.SIDES, ROOM)),
             ("hard", AVOIDED, static.SIDES),
         )
         for controller in controllers(options, mode)
@@ -58,7 +58,7 @@ def cells(options: TrialOptions) -> list[Row]:
 
 
 def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
-    """Run one trial; return what is measured and what it left behind."""
+    """Run one trial; return its row and its record."""
     trajectory, side = cell["trajectory"], cell["side"]
     error = Misplacement(cell["position_mm"], cell["orientation_deg"], cell["told"] == "told")
     believed, _ = misplaced(context.skin, context.model, error, seed)
@@ -96,22 +96,22 @@ _BOARDS = (
     Column("false", "false_detections"),
 )
 _BOARDS_NOTE = (
-    "Each unit sits this far from where the controller believes it to be, in a direction of its own, or is turned by"
-    " this angle about an axis of its own; stated: the skin file says so as standard deviations. Hit: trials with"
-    " contact. Ratio: of the true force to that of the trial with units in their place. False: detections before the"
+    "Each unit is displaced by this distance in a random direction, or turned by this angle about a random axis, and"
+    " the controller does not know it. Stated: the skin file declares the errors as standard deviations. Hit: trials"
+    " with contact. Ratio: true force over that of the trial with units in their places. False: detections before the"
     " contact."
 )
 _ROOMS = (*_ERROR, Column("way\n[%]", "travelled_m_ratio", 0, 100.0), Column("false", "false_detections"))
 _ROOMS_NOTE = (
-    "Twenty seconds on the circle and on the line with nothing near: all that the controller takes for an obstacle is"
-    " the arm or the floor. Way: travelled, of that with units in their place."
+    "Twenty seconds on the circle and on the line with nothing near: every obstacle of the controller is the arm or the"
+    " floor. Way: distance along the path over that with units in their places."
 )
 
 
 def tables(rows: list[Row]) -> list[TextTable]:
-    """Show what misplaced units change of the forces at the board, and of free motion.
+    """Return tables of the effects of misplaced units on forces at the board, and on free motion.
 
-    Ratios are those to the trial with the same seed at the same place whose units sit where they are believed to.
+    The reference of a ratio is the trial with the same seed and place whose units are not misplaced.
     """
     same = ("trajectory", "side", "profile", "restrictions", "seed")
     compared = ratios(rows, {"position_mm": 0.0, "orientation_deg": 0.0}, same, ("true_peak_20ms_n", "travelled_m"))

@@ -1,4 +1,4 @@
-"""Paper IV-A: the arm runs into a large static object, on a circle and on a line, from either side."""
+"""Paper IV-A: the arm moves into a large static object, on a circle and on a line, from either side."""
 
 from collections.abc import Callable
 from itertools import product
@@ -26,7 +26,7 @@ _AFTER_DETECTION_S = 1.0
 
 
 def cells(options: TrialOptions) -> list[Row]:
-    """All combinations of stiffness, trajectory, side and controller."""
+    """Return all combinations of stiffness, trajectory, side and controller."""
     return [
         {"trajectory": trajectory, "side": side, "stiffness_n_per_m": stiffness, **controller}
         for stiffness, trajectory, side, controller in product(
@@ -36,7 +36,7 @@ def cells(options: TrialOptions) -> list[Row]:
 
 
 def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
-    """Run one trial; return what is measured and what it left behind."""
+    """Run one trial; return its row and its record."""
     trajectory, side, where = cell["trajectory"], cell["side"], context.placement
     scene = static_scene(trajectory, side, cell["stiffness_n_per_m"], seed, where)
     record = play(context.setup(cell, seed, scene, static_path(trajectory, side, where)), done_after_contact())
@@ -44,7 +44,7 @@ def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
 
 
 def done_after_contact() -> Callable[[ControlStep, Plant], bool]:
-    """End a while after the first reaction that a true contact caused, or at the time limit."""
+    """Return a test that ends a trial a second after the first reaction to a true contact, or at the time limit."""
     detected: list[float] = []
 
     def done(step: ControlStep, plant: Plant) -> bool:
@@ -57,7 +57,7 @@ def done_after_contact() -> Callable[[ControlStep, Plant], bool]:
 
 
 def results(record: Record, push: float, links: tuple[str, ...]) -> Row:
-    """Numbers of one trial; `push` is the sign of the force along y by which the object pushes the arm.
+    """Return the measures of a trial; `push` is the sign of the object's force on the arm along y.
 
     The impact speed is the true closing speed of the point of the arm that touches first.
     """
@@ -90,7 +90,7 @@ def results(record: Record, push: float, links: tuple[str, ...]) -> Row:
 
 
 def least_sensed(record: Record) -> float | None:
-    """Least distance [m] of anything sensed from the arm's surface, None if nothing was sensed."""
+    """Return the least distance [m] of a sensed point from the arm's surface, None without a point."""
     least = min((float(s.obstacles.body_distance.min(initial=np.inf)) for s in record.steps), default=np.inf)
     return rounded(least, 4) if np.isfinite(least) else None
 
@@ -109,16 +109,18 @@ _SHOWN_STIFFNESS = 25_000.0
 _PROFILE = Column("profile\nobject", "profile", second="object")
 _BY_OBJECT = (_PROFILE, *_FORCES, Column("detected", "detected", of="contact"))
 _BY_OBJECT_NOTE = (
-    "Impact: closing speed of the point that touches first. Delay: from the true force passing 1 N. Filtered (eq. 8)"
-    " and raw: the estimate at detection. Peak: of the estimate. True: peak of the true force, of its 20 ms mean and of"
-    " itself. Detected: of all contacts. slowing-only: eqs. 3-4 without F_obs. thresholds-only: F_obs without eqs. 3-4."
-    " paper-0.5m: objects count within the 0.5 m of the paper's text instead of Table I's 0.8 m. pretouch: slower where"
-    " it has to be to brake in time, and contacts detected by the joint torques. False detections: "
+    "Impact: closing speed of the point that touches first. Delay: from 1 N of true force. Filtered (eq. 8) and raw:"
+    " the estimate at detection. Peak: of the estimate. True 20 ms, true: peaks of the true force, as 20 ms mean and as"
+    " it is. Detected: of all contacts. slowing-only: eqs. 3-4 without F_obs. thresholds-only: F_obs without eqs. 3-4."
+    " paper-0.5m: objects count within the 0.5 m of the paper's text instead of Table I's 0.8 m. pretouch: it slows to"
+    " brake in time, and detects contacts by the joint torques. False detections: "
 )
 _RATIOS = tuple(
     Column(c.heading.split("\n")[0], f"{c.key}_ratio", 2, band=True) for c in _FORCES if "delay" not in c.key
 )
-_RATIOS_NOTE = "The paper finds forces about two times smaller with proximity; which force is meant decides the number."
+_RATIOS_NOTE = (
+    "The paper reports forces about two times smaller with proximity; the number depends on the compared force."
+)
 _BY_MODE = (
     Column("profile\nmode", "profile", second="restrictions"),
     Column("hit", "contact", of="trials"),
@@ -126,13 +128,13 @@ _BY_MODE = (
     *_FORCES[:-1],
 )
 _BY_MODE_NOTE = (
-    "Hit: trials with contact. Least: nearest that anything sensed came to the arm's surface in 40 s or until contact,"
-    " by what was sensed."
+    "Hit: trials with contact. Least: least sensed distance of an object from the arm's surface in 40 s or until"
+    " contact."
 )
 
 
 def tables(rows: list[Row]) -> list[TextTable]:
-    """Show forces by profile and stiffness, their ratios to `blind`, and what restrictions of the approach change."""
+    """Return tables of forces by profile and stiffness, their ratios to `blind`, and the effects of restrictions."""
     same = ("trajectory", "side", "stiffness_n_per_m", "seed")
     every = [
         row | {"detected": row["detection_delay_s"] is not None, "object": f"{row['stiffness_n_per_m'] / 1000:g} N/mm"}
@@ -143,19 +145,19 @@ def tables(rows: list[Row]) -> list[TextTable]:
     compared = [row for row in named if row["profile"] != "blind" and row["true_peak_n_ratio"]]
     by_object, by_mode, where = ("profile", "object"), ("profile", "restrictions"), "all four places together"
     title, note = f"Static object, {where}: medians, 10-90 % below", f"{sum(r['false_detections'] for r in named)}."
-    made = [medians(title, _BY_OBJECT, named, by_object, _BY_OBJECT_NOTE + note)]
+    every_table = [medians(title, _BY_OBJECT, named, by_object, _BY_OBJECT_NOTE + note)]
     if compared:
         title = f"Times smaller than without proximity, {where}: medians, 10-90 % below"
-        made.append(medians(title, (_PROFILE, *_RATIOS), compared, by_object, _RATIOS_NOTE))
+        every_table.append(medians(title, (_PROFILE, *_RATIOS), compared, by_object, _RATIOS_NOTE))
     if len({(row["profile"], row["restrictions"]) for row in every}) > len(mode):
         sensing = [row for row in every if row["profile"] != "blind" and row["stiffness_n_per_m"] == stiffness]
         title = f"Static object, {stiffness / 1000:g} N/mm, by restriction mode: {where}"
-        made.append(medians(title, _BY_MODE, sensing, by_mode, _BY_MODE_NOTE))
-    return made
+        every_table.append(medians(title, _BY_MODE, sensing, by_mode, _BY_MODE_NOTE))
+    return every_table
 
 
 def shown_controllers(rows: list[Row]) -> tuple[float, dict[str, str], list[str]]:
-    """Choose of many cells what to show in detail.
+    """Choose the controllers to show in detail.
 
     Returns:
         A stiffness [N/m], the first restriction mode of each profile, and the names of one to three profiles, `blind`
@@ -166,19 +168,19 @@ def shown_controllers(rows: list[Row]) -> tuple[float, dict[str, str], list[str]
     for row in rows:
         mode.setdefault(row["profile"], row["restrictions"])
     others = [name for name in mode if name not in ("blind", "pretouch")]
-    shown = [name for name in ("blind", *others[:1], "pretouch") if name in mode]
+    names = [name for name in ("blind", *others[:1], "pretouch") if name in mode]
     stiffness = _SHOWN_STIFFNESS if _SHOWN_STIFFNESS in stiffnesses else stiffnesses[0]
-    return stiffness, mode, shown if "blind" in mode else list(mode)[:1]
+    return stiffness, mode, names if "blind" in mode else list(mode)[:1]
 
 
 def shown_cells(rows: list[Row]) -> list[Row]:
-    """Choose the trials of the figure: each place with up to three profiles."""
-    stiffness, mode, shown = shown_controllers(rows)
+    """Return the trials of the figure: each place with up to three profiles."""
+    stiffness, mode, names = shown_controllers(rows)
     return [
         row
         for row in rows
         if row["stiffness_n_per_m"] == stiffness
-        and row["profile"] in shown
+        and row["profile"] in names
         and row["restrictions"] == mode[row["profile"]]
     ]
 

@@ -1,4 +1,4 @@
-"""Two arms that reach over one table with a person between: blind to each other, seen by the skin alone, or told."""
+"""Two arms that reach over one table with a person between: blind to each other, in view of the skin, or informed."""
 
 from dataclasses import dataclass, field
 from functools import partial
@@ -27,36 +27,36 @@ from pretouch_lab.table import Column, medians, rounded
 from pretouch_lab.trial import SETTLE_S, Record
 
 KNOWS = ("blind", "seen", "told")
-"""What each arm has of the other: units that see through it; units that take it for anything else; or its reported
-state, by which it is a fixture that moves."""
+"""Knowledge of each arm about the other: none, as its units see through it; readings of its units; or its reported
+state, which makes it a moving fixture."""
 _DURATION_S = 40.0
 APART = BasePose((1.1, 0.0, 0.0), np.pi)
-"""Where the second arm stands: across the table, face to face with the first."""
+"""Base of the second arm: across the table, face to face with the first."""
 BACK: FloatArray = np.asarray(np.linalg.inv(APART.T))
-"""Where the first stands in the base frame of the second (4, 4)."""
+"""Base of the first arm in the base frame of the second (4, 4)."""
 _HOME_M, _REACH_M = np.array([0.35, 0.35, 0.35]), np.array([0.58, 0.0, 0.25])
-"""Where each arm comes from and what it reaches for, in its own base frame but for the sign of home's y: in the world
-both come from +y, and reach over the middle by 3 cm."""
+"""Start and goal of each arm in its own base frame, but for the sign of the start's y: in the world both arms start at
++y, and reach over the middle by 3 cm."""
 _RESTS_M = np.array([0.55, -0.8, 0.45])
-"""Where the person's hand waits."""
+"""Waiting place of the person's hand."""
 _AIM_M = np.array([0.55, 0.0, 0.3])
-"""What it reaches for, within `_SPREAD_M`."""
+"""Goal of the person's hand, varied by up to `_SPREAD_M`."""
 _SPREAD_M = 0.08
 _EVERY_S, _STAYS_S, _REACHING_S = 7.0, 1.5, 1.6
-"""Time between two visits, how long the hand stays, and how long it is on its way."""
+"""Time from one visit to the next, duration of a stay, and duration of reaching."""
 _FREE_N = 60.0
-"""Force a person moves the free hand with [N], as in the other experiments."""
+"""Force of a person who moves the free hand [N], as in the other experiments."""
 _SPEED_M_S = 0.5
 
 
 @dataclass
 class Reaches:
-    """A person who reaches between the arms again and again, whatever they do."""
+    """A person who reaches between the arms again and again, without regard to them."""
 
     begin: float
-    """When the first visit begins [s]."""
+    """Start of the first visit [s]."""
     aims: FloatArray
-    """(V, 3) what each visit reaches for [m]."""
+    """(V, 3) goal of each visit [m]."""
 
     def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
         """Reach, stay and withdraw, each visit with its own aim."""
@@ -72,7 +72,7 @@ def reaches(rng: np.random.Generator, duration: float) -> Reaches:
 
 
 def way(side: float, share: float) -> WayPoints:
-    """Return the way from home to what is reached for and back, begun at a share of the way there."""
+    """Return the path from home to the goal and back, starting at a fraction of the way to the goal."""
     home, reach = _HOME_M * [1.0, side, 1.0], _REACH_M
     points = [home, reach] if share == 0.0 else [home + share * (reach - home), reach, home]
     return WayPoints(np.array(points), closed=True)
@@ -80,7 +80,7 @@ def way(side: float, share: float) -> WayPoints:
 
 @dataclass
 class Peaks:
-    """The largest forces between two arms, and of either on the person."""
+    """Largest forces between two arms, and of either on the person."""
 
     arms_n: float = 0.0
     person_n: float = 0.0
@@ -112,13 +112,13 @@ class Peaks:
 
 @dataclass
 class Side:
-    """One of the two arms with its controller, and what it did."""
+    """One of the two arms with its controller and its steps."""
 
     arm: ArmInWorld
     units: RangeFinders
     controller: Controller
     options: Options
-    """What the controller is told of the other arm."""
+    """Options of the loop, with the other arm as a moving fixture if it is known."""
     steps: list[ControlStep] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -126,14 +126,14 @@ class Side:
         self._state = self.controller.init(self.robot)
 
     def turn(self, tick: float) -> None:
-        """Let one control cycle pass at a tick [s]."""
+        """Run one control cycle at a tick [s]."""
         cycle = turn(self.controller, self._state, self.arm, self.units, tick, self.options)
         self._state, self.robot = cycle.after, cycle.inputs.robot
         self.steps.append(cycle.step)
 
 
 def play(context: Context, profile: Profile, knows: str, seed: int, duration: float) -> tuple[list[Side], Peaks]:
-    """Run a trial; `knows` is what each arm has of the other: `blind`, `seen` or `told`."""
+    """Run a trial; `knows` is one of `KNOWS`."""
     model, rng = context.model, np.random.default_rng([seed, 61])
     ways = way(1.0, 0.0), way(-1.0, float(rng.uniform()))
     person = reaches(rng, duration)
@@ -167,7 +167,7 @@ def _reported(sides: list[Side], number: int) -> RobotState:
 
 
 def _mounted(arm: ArmInWorld, across: ArmInWorld, context: Context, seed: int, blind: bool) -> RangeFinders:
-    """Mount the units on an arm; blind ones see through the arm across, as through all that is transparent."""
+    """Mount the units on an arm; if blind, they see through the other arm, which is transparent to them."""
     mj = arm.mj_model
     links = np.arange(across.first_body + 1, across.first_body + len(across.model.links))
     of_it = np.isin(mj.geom_bodyid, links)
@@ -180,7 +180,7 @@ def _mounted(arm: ArmInWorld, across: ArmInWorld, context: Context, seed: int, b
 
 
 def cells(options: TrialOptions) -> list[Row]:
-    """Each profile that senses, blind to the other arm, with its skin alone, and told of it."""
+    """Return cells of each profile with proximity and each value of `KNOWS`."""
     return [
         {"knows": knows, **controller}
         for controller, knows in product(controllers(options, "slack"), KNOWS)
@@ -189,14 +189,14 @@ def cells(options: TrialOptions) -> list[Row]:
 
 
 def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record | None]:
-    """Run one trial; return what is measured."""
+    """Run one trial; return its row."""
     own = context.profile(cell)
     sides, peaks = play(context, own, cell["knows"], seed, _DURATION_S)
     return results(sides, peaks, own.task.speed_m_s * (_DURATION_S - sides[0].steps[0].stamp)), None
 
 
 def results(sides: list[Side], peaks: Peaks, asked_m: float) -> Row:
-    """Numbers of one trial, in which each arm was asked for a way of so many metres."""
+    """Return the measures of a trial; `asked_m` is the demanded path length of each arm [m]."""
     return {
         "arms_touched": peaks.arms_n > TOUCH_N,
         "arms_peak_n": rounded(peaks.arms_n, 1),
@@ -218,11 +218,11 @@ _COLUMNS = (
 
 
 def tables(rows: list[Row]) -> list[TextTable]:
-    """Show what touched what, and how much of the way was done."""
+    """Return a table of contacts, and of progress along the paths."""
     note = (
-        "Blind: the units see through the other arm. Seen: they take it for anything that comes near. Told: its"
-        " reported joint positions make it a fixture that moves. Arms touch, person touched: trials with such a touch;"
-        f" peak: the largest force of a trial. Way: of what is asked in {_DURATION_S:g} s, the mean of both arms."
+        "Blind: the units see through the other arm. Seen: it is an obstacle like any other. Told: its reported joint"
+        " positions make it a moving fixture. Arms touch, person touched: trials with such a contact. Peak: largest"
+        f" force of a trial. Way: distance over the demanded distance in {_DURATION_S:g} s, the mean of both arms."
     )
     title = "Two arms over one table, a person between: medians over the seeds"
     return [medians(title, _COLUMNS, rows, ("profile", "restrictions", "knows"), note, 2)]

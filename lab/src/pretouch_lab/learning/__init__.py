@@ -1,4 +1,4 @@
-"""A Gymnasium environment, with a shield between the policy and the arm or without."""
+"""A Gymnasium environment with an optional shield between the policy and the arm."""
 
 from pretouch.extras import Extra
 
@@ -7,7 +7,7 @@ REACH = "pretouch/Reach-v0"
 
 
 def _register() -> None:
-    """Make the environment known to Gymnasium, which loads no plugins from release 1.4 on: this import does it."""
+    """Register the environment with Gymnasium at import; from release 1.4 Gymnasium loads no plugins."""
     if LEARN.missing("gymnasium"):
         return
     import gymnasium

@@ -1,4 +1,4 @@
-"""`pretouch/Reach-v0`: reach places one after the other where people come into the arm's way."""
+"""`pretouch/Reach-v0`: reach goals one after the other while people enter the arm's path."""
 
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -22,38 +22,38 @@ PEOPLE = ("person -y", "person +y", "beside", "inside", "walking")
 """Scenes of the avoidance benchmark with people."""
 SHIELDED = "pretouch"
 ALONE = "blind:detect.f_base_n=10000:failure.force_timeout_s=1e6"
-"""Limits of the joints alone: it knows nothing of what is near, no force is a contact, and it needs no estimate of one:
-`blind` as it is stops near a singularity, for want of an estimate, and does not go on."""
+"""Profile with the limits of the joints alone: it ignores obstacles, no force is a contact, and it needs no estimate of
+the force. The profile `blind` stops near a singularity, where there is no estimate, and does not continue."""
 SKINS = ("paper", "dense")
 GOALS = 3
-"""Goals held that end an episode."""
+"""Number of reached goals that ends an episode."""
 _TIME_S = 12.0
-"""Longest episode."""
+"""Duration of the longest episode [s]."""
 ActionKind = Literal["twist", "joint_velocities"]
 Observation = dict[str, FloatArray]
 
 CYCLES = 5
-"""Control cycles of a step: 0.05 s, within which an action does not go stale."""
+"""Control cycles of a step: 0.05 s, shorter than the time after which an action is stale."""
 NEAR_M = 0.05
-"""The end-effector is at its goal within this."""
+"""Largest distance of the end-effector from its goal to be at the goal [m]."""
 HELD = 5
-"""Steps at the goal after which it is held."""
+"""Steps at the goal that count as reaching it."""
 SPEED_M_S = 0.3
-"""Velocity of the end-effector that an action of 1 along an axis asks for: the paper's speed."""
+"""Velocity of the end-effector for an action of 1 along an axis [m/s]: the paper's speed."""
 TURN_RAD_S = 0.5
-"""Angular velocity, likewise."""
+"""Angular velocity for an action of 1 about an axis [rad/s]."""
 _JOINT_SHARE = 0.25
-"""Share of a joint's largest velocity that an action of 1 asks for."""
+"""Fraction of a joint's largest velocity for an action of 1."""
 _SEEN_M = 1.0
-"""What is farther than this changes nothing that an arm does soon; a unit that sees nothing reads as this."""
+"""Largest distance in an observation [m], and the value of a unit without a reading."""
 _MOST_M = 2.0
-"""Beyond the reach of an arm and of what it is asked."""
+"""Bound on positions in an observation [m], beyond the reach of the arm."""
 _MEAN_STEPS = 20
-"""Physics steps that a peak force is the mean of, as in the benchmark: 20 ms."""
+"""Physics steps of the mean for a peak force, 20 ms as in the benchmark."""
 _CLEAR_M = 0.15
-"""A goal is this far from what stands in the scene at the start."""
+"""Least distance of a goal from the obstacle [m]."""
 _AWAY_M = 0.2
-"""And this far from where the end-effector is."""
+"""Least distance of a goal from the end-effector [m]."""
 _DRAWS = 1000
 
 
@@ -71,22 +71,22 @@ class Interface:
         fast, far, model = 2.0 * self.model.description.qd_max, np.full(3, _MOST_M), self.model
         return {
             "ranges": (np.zeros(self.units), np.full(self.units, _SEEN_M)),
-            "q": (model.q_min - 0.1, model.q_max + 0.1),  # an encoder's noise, and what gives way in a contact
+            "q": (model.q_min - 0.1, model.q_max + 0.1),  # room for encoder noise and yielding joints
             "qd": (-fast, fast),
             "ee": (-far, far),
             "goal": (-far, far),
         }
 
     def observe(self, robot: RobotState, readings: RangeReadings, goal: FloatArray) -> Observation:
-        """Return what a policy is given.
+        """Return the observation of a policy.
 
         Args:
             robot: state of the arm.
             readings: of its K units.
-            goal: (3,) where the end-effector is to be [m], base frame.
+            goal: (3,) goal of the end-effector [m], base frame.
 
         Returns:
-            `ranges` (K,) the newest distances [m], 1 where a unit sees nothing nearer; `q` (n,) [rad]; `qd` (n,)
+            `ranges` (K,) the newest distances [m], 1 for a unit without a nearer reading; `q` (n,) [rad]; `qd` (n,)
             [rad/s]; `ee` (3,) position of the end-effector [m]; `goal` (3,) from there to the goal [m].
         """
         ee = self.model.kinematics(robot.q).position[self.model.ee]
@@ -96,13 +96,13 @@ class Interface:
 
     @property
     def scale(self) -> FloatArray:
-        """(6,) or (n,) what an action of 1 asks for [m/s, rad/s]."""
+        """(6,) or (n,) velocities for an action of 1 [m/s, rad/s]."""
         if self.action == "twist":
             return np.repeat((SPEED_M_S, TURN_RAD_S), 3)
         return _JOINT_SHARE * self.model.description.qd_max
 
     def desired(self, stamp: float, action: FloatArray) -> Desired:
-        """Return what an action between -1 and 1 asks for, by the clock of the steps [s]."""
+        """Return the desired motion of an action between -1 and 1, stamped by the clock of the steps [s]."""
         number = self.scale * np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
         if self.action == "twist":
             return desired.twist(stamp, number[:3], number[3:])
@@ -110,10 +110,10 @@ class Interface:
 
 
 class ReachScene:
-    """The arm of a scenario and a seed: the same errors, person and noise as the benchmark's trial of that seed."""
+    """The arm of a scenario and a seed, with the errors, person and noise of the benchmark's trial of that seed."""
 
     def __init__(self, scenario: Scenario, profile: Profile, skin_name: str, seed: int) -> None:
-        """Build it, and let the arm stand until contacts can be detected."""
+        """Build the arm, and let it stand until the force window is full."""
         scene = setting(replace(scenario, params={**scenario.params, "skin": skin_name}), profile, seed)
         setup = scene.setup
         if not profile.perception:  # the policy reads units that the controller does not
@@ -123,11 +123,11 @@ class ReachScene:
         self._state = self._arm.controller.init(self._arm.plant.read())
         self._forces = np.zeros(_MEAN_STEPS - 1)
         self.contacts = 0
-        """Times that something began to touch the arm."""
+        """Number of contacts with the arm so far."""
         self.peak_force = 0.0
         """Largest mean of the true force over 20 ms [N]."""
         self.mean_force = 0.0
-        """Mean of the true force since `turn` was called last [N]."""
+        """Mean of the true force in the last `turn` [N]."""
         self.robot: RobotState
         self.readings: RangeReadings
         self.step = self.turn(desired.twist(self._arm.plant.time, np.zeros(3)), 1)
@@ -140,7 +140,7 @@ class ReachScene:
         return self.model.kinematics(self.robot.q).position[self.model.ee]
 
     def turn(self, target: Desired, cycles: int) -> ControlStep:
-        """Let control cycles pass under what is asked, and return the last step; what is observed is of after it."""
+        """Run control cycles with a desired motion, and return the last step; robot and readings are from after it."""
         options, arm = Options(desired=lambda: target), self._arm
         for _ in range(cycles):
             cycle = turn(arm.controller, self._state, arm.plant, arm.skin, arm.clock.tick(), options)
@@ -155,7 +155,7 @@ class ReachScene:
         return self.step
 
     def goal(self, rng: np.random.Generator) -> FloatArray:
-        """Draw a place (3,) [m] on the scenario's path, away from the hand and from what stands in its way."""
+        """Draw a goal (3,) [m] on the scenario's path, away from the end-effector and from the obstacle."""
         shape = self._shape(self._arm.hand.position if self._arm.hand else np.zeros(3))
         for _ in range(_DRAWS):
             point = self._path.point(rng.uniform(0.0, self._path.length))
@@ -166,28 +166,28 @@ class ReachScene:
 
 @dataclass(frozen=True)
 class Reward:
-    """What a step earns, with the shield and without."""
+    """Reward of a step, with the shield and without."""
 
     progress_1_m: float = 10.0
-    """For each metre nearer to the goal."""
-    held: float = 5.0
-    """For a goal held."""
+    """Reward for each metre nearer to the goal."""
+    goal: float = 5.0
+    """Reward for a reached goal."""
     force_1_n: float = 0.01
-    """Lost for each newton of the mean true contact force in the step."""
+    """Penalty for each newton of the mean true contact force in the step."""
     bound_n: float = 140.0
     """Peak of the true force (mean of 20 ms) that ends an episode [N]: quasi-static limit of a hand (ISO/TS 15066)."""
     broken: float = 20.0
-    """Lost where it is exceeded."""
+    """Penalty for a larger peak."""
 
 
 class ReachEnv(gymnasium.Env):  # type: ignore[misc]  # not followed, see pyproject
     """A simulated Panda with a skin reaches three goals on the path of a scenario.
 
-    `Interface` tells what is observed, and what an action between -1 and 1 asks for. The action is stamped
-    by the step it was observed at, and counts from the control cycle after it. `reset(seed=n)` gives the arm, person
-    and noise of trial n of the benchmark; without a seed others are drawn. An episode is terminated by its third goal
-    held or by too large a force, and truncated after 12 s. `info` has `contacts`, `peak_force_n`, `goals`, and of the
-    last control cycle `limited` (`Limit`, by its value) and `share`.
+    `Interface` describes observations, and the motion of an action between -1 and 1. An action has the stamp of the
+    step of its observation, and acts from the next control cycle on. `reset(seed=n)` gives the arm, person and noise of
+    trial n of the benchmark; without a seed they are random. The third goal or too large a force terminates an episode;
+    12 s truncate it. `info` has `contacts`, `peak_force_n`, `goals`, and from the last control cycle `limited` (value
+    of `Limit`) and `share`.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  # Gymnasium's
@@ -201,14 +201,14 @@ class ReachEnv(gymnasium.Env):  # type: ignore[misc]  # not followed, see pyproj
         scenes: tuple[str, ...] = PEOPLE,
         reward: Reward | None = None,
     ) -> None:
-        """Make it; the first reset builds the arm.
+        """Prepare the environment; the first reset builds the arm.
 
         Args:
-            shield: whether the controller is `pretouch`; else it has the limits of the joints alone.
+            shield: True for the controller `pretouch`, False for the limits of the joints alone.
             action: twist (6,) or joint_velocities (7,).
             skin_name: paper, seven units, or dense, 32.
-            scenes: scenarios of `bench avoidance`, one of which is drawn for each episode.
-            reward: what a step earns.
+            scenes: scenarios of `bench avoidance`; each episode draws one.
+            reward: reward of a step.
         """
         if action not in ("twist", "joint_velocities"):
             raise ParameterError(f"The action is {action!r}: choose twist or joint_velocities.")
@@ -243,7 +243,7 @@ class ReachEnv(gymnasium.Env):  # type: ignore[misc]  # not followed, see pyproj
         return self._seen(self._scene)
 
     def step(self, action: FloatArray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Let a step pass; see the class."""
+        """Run a step; see the class."""
         scene, reward = self._scene, self._reward
         if scene is None:
             raise ParameterError("The episode has not begun: call reset() before step().")
@@ -253,7 +253,7 @@ class ReachEnv(gymnasium.Env):  # type: ignore[misc]  # not followed, see pyproj
         earned = reward.progress_1_m * (before - self._distance) - reward.force_1_n * scene.mean_force
         self._at_goal = self._at_goal + 1 if self._distance < NEAR_M else 0
         if self._at_goal == HELD:
-            earned += reward.held
+            earned += reward.goal
             self._goals += 1
             self._next_goal(scene)
         broken = scene.peak_force > reward.bound_n
