@@ -1,1 +1,1 @@
-"""What an arm's residual torques in free motion tell of it: offsets, friction, ripple, masses and noise."""
+"""Identification of an arm from its residual torques in free motion: offsets, friction, ripple, masses and noise."""

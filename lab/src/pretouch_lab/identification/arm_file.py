@@ -1,4 +1,4 @@
-"""An identified arm as a world file, TOML that every simulation takes (`sim.randomisation`); and as a figure."""
+"""An identified arm as a world file in TOML for simulations (`sim.randomisation`), and as a figure."""
 
 from collections.abc import Iterable
 
@@ -13,17 +13,17 @@ _MOST_POINTS = 4000
 
 
 def arm_toml(result: IdentifiedArm, model: RobotModel, source: str) -> str:
-    """Return the file's text; what could not be identified keeps its usual value, and a comment says so."""
+    """Return the file's text; numbers that were not identified keep their defaults, and comments say so."""
     fitted, noise, usual = result.fit, result.noise, result.usual
     share = 1.0 - usual.friction_compensated
     origin = "".join(c if c.isprintable() and c not in '"\\' else "_" for c in source)
     lines = [
         f'about = "An arm identified from {origin}: {result.seconds:.0f} s of free motion."',
         "",
-        f"# friction_compensated stays at {usual.friction_compensated:g}: only what is not compensated shows, so",
-        f"# friction_f1_nm is that, divided by {share:g}.",
+        f"# friction_compensated stays at {usual.friction_compensated:g}: only friction that is not compensated shows,",
+        f"# so friction_f1_nm is that part divided by {share:g}.",
         f"# torque_noise_hz stays at {usual.torque_noise_hz:g}: the observer hides it.",
-        "# stiffness, damping, rotor inertia and delays stay as they are: a residual does not tell them.",
+        "# stiffness, damping, rotor inertia and delays stay unchanged: a residual does not determine them.",
     ]
     for row in result.of_joints():
         values, errors = row.values, row.standard_errors
@@ -31,15 +31,15 @@ def arm_toml(result: IdentifiedArm, model: RobotModel, source: str) -> str:
             values, errors = np.maximum(values, 0.0) / share, errors / share
         if row.field:
             unsure = ", ".join(str(j + 1) for j in np.flatnonzero(~row.identified))
-            note = f"# joints {unsure}: the recording hardly tells"
+            note = f"# joints {unsure}: hardly determined by the recording"
             lines += _field(row.field, _list(values), _list(errors), note if unsure else "")
     masses = next(row for row in result.of_joints() if row.field == "")
     factors, errors = np.ones(len(model.links)), np.zeros(len(model.links))
     for link, moved in enumerate(map(np.flatnonzero, model.moved_by)):
-        if len(moved):  # links behind the same joint are off alike
+        if len(moved):  # links behind the same joint have the same error
             factors[link], errors[link] = max(1.0 + masses.values[moved[-1]], 0.05), masses.standard_errors[moved[-1]]
     unsure = ", ".join(model.joints[j] for j in np.flatnonzero(~masses.identified))
-    note = f"# the links behind {unsure}: what was assumed before is hardly changed"
+    note = f"# the links behind {unsure}: hardly changed from the assumption"
     lines += _field("mass_factors", _list(factors), _list(errors), note if unsure else "")
     payload, error = fitted.payload
     lines += _field("payload_kg", f"{max(payload, 0.0):.6g}", f"{error:.3g}")
@@ -50,7 +50,7 @@ def arm_toml(result: IdentifiedArm, model: RobotModel, source: str) -> str:
         lines += [
             "",
             "# velocity_noise_rad_s and observer_gain_1_s stay: the recording has no measured velocities.",
-            "# torque_noise_nm stays as well: what is left of the torques has the noise of both in it.",
+            "# torque_noise_nm stays as well: the residuals contain the noise of both.",
         ]
     return "\n".join(lines) + "\n"
 
@@ -64,7 +64,7 @@ def _list(values: Iterable[float] | FloatArray) -> str:
 
 
 def residual_figure(result: IdentifiedArm, model: RobotModel, title: str) -> Figure:
-    """Draw what was to be explained and what is, one row a joint."""
+    """Draw measured and explained torques, one panel for each joint."""
     figure = Figure(figsize=(9, 1.6 * model.n + 1), layout="constrained")
     panels = figure.subplots(model.n, 1, sharex=True, squeeze=False)[:, 0]
     stamp = result.samples.stamp

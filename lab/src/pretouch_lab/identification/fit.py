@@ -1,17 +1,17 @@
-"""The parts of an arm's residual in free motion, found together: robust, with standard errors.
+"""Robust fit of all parts of an arm's residual in free motion, with standard errors.
 
-The residual that a momentum observer of gain K leaves of an arm in free motion is, with L its low-pass,
+The residual of a momentum observer of gain K for an arm in free motion is, with L its low-pass,
 
     r = -L[(1 - c) tau_f(qd)] - offset - L[ripple(q)] + L[masses and payload] + K' M v + noise,
 
-for the torque sensors' errors are taken for torques of the environment with their sign turned round, and so is the part
-(1 - c) of the friction that the interface does not subtract. v is the noise of the measured joint velocities, which is
-in the recording: what is measured less the derivative of the positions. It kicks the momentum, so that K' = K / (1 +
-K dt) follows from a regression. All else is linear but for the friction's shape, F2 and F3: Gauss-Newton, with priors
-so wide that they only hold what the motion does not show.
+because errors of the torque sensors look like torques of the environment with the opposite sign, and so does the part
+(1 - c) of the friction that the interface does not subtract. v is the noise of the measured joint velocities: measured
+velocity less the derivative of the positions. It changes the momentum, so that K' = K / (1 + K dt) follows from a
+regression. The model is linear except for the friction's shape, F2 and F3: Gauss-Newton, with wide priors that only
+determine numbers which the motion does not.
 
-Outliers count little (weights of a Student distribution). Standard errors are of a sandwich: the scores are summed over
-blocks of 1 s, so that they may be correlated within a block, and the priors stand in both breads and filling.
+Weights of a Student distribution reduce the influence of outliers. Standard errors are sandwich estimates: the scores
+are summed over blocks of 1 s, so that they may be correlated within a block. The priors enter both breads and filling.
 """
 
 import numpy as np
@@ -28,34 +28,34 @@ from pretouch_lab.identification.motion import GRID_S, ArmMotion
 from pretouch_lab.identification.recording import Usable, joint_scale
 
 _FINE_S = 0.001
-"""Spacing at which friction and ripple are low-passed [s]."""
+"""Time step of the low-pass of friction and ripple [s]."""
 _REMEMBERED_S = 0.2
-"""What is left out after a speed has changed quickly [s]; an observer of 40 1/s and more has forgotten it by then."""
+"""Time left out after a quick change of speed [s]; an observer of 40 1/s or more has forgotten the change by then."""
 OWN = 6
-"""Numbers of a joint: offset, friction, ln F2, F3, both parts of the ripple."""
+"""Parameters of a joint: offset, friction, ln F2, F3, both parts of the ripple."""
 _ROUNDS = 20
 _TAILS = 5.0
-"""Degrees of freedom of the Student distribution of what is left [1]: an outlier counts little."""
+"""Degrees of freedom of the residuals' Student distribution [1]: outliers have little influence."""
 BLOCK_S = 1.0
-"""Length of the blocks that are taken as independent [s]: ten times what an observer remembers, and more."""
+"""Length of independent blocks [s]: more than ten times the observer's memory."""
 _OFFSET_NM, _FRICTION_NM, _RIPPLE_NM = 3.0, 1.0, 0.5
-"""Standard deviations before anything is known, wide: of an offset, of the friction that the interface does not
-compensate, and of each part of a joint's ripple [Nm]."""
+"""Prior standard deviations, wide: of an offset, of the friction that the interface does not compensate, and of each
+part of a joint's ripple [Nm]."""
 _STEEPNESS, _ASYMMETRY_RAD_S = 0.5, 0.04
-"""Of the logarithm of F2 about the usual one [1], and of F3 [rad/s]."""
+"""Prior standard deviations of the logarithm of F2 about its default [1], and of F3 [rad/s]."""
 _MASS, _PAYLOAD_KG = 0.1, 0.5
-"""Of the relative error of each link's mass [1], and of the unknown payload [kg]."""
+"""Prior standard deviations of the relative error of each link's mass [1], and of the unknown payload [kg]."""
 _SETTLED = 1e-2
-"""A fit is done when no number moves by more than this part of what was known before [1]."""
+"""Largest step of a converged fit as a fraction of the prior standard deviations [1]."""
 _REACH = 1.0
 
 
 @value
 class Columns:
-    """What does not depend on the numbers: N samples of n joints; F instants lie 1 ms apart, G as those of a motion."""
+    """Parts of the model without its parameters: N samples of n joints; F instants 1 ms apart, G `GRID_S` apart."""
 
     motion: list[ArmMotion]
-    """Of each stretch."""
+    """Motion in each stretch."""
     q: list[FloatArray]
     """(F, n) joint positions in each stretch [rad]."""
     speed: list[FloatArray]
@@ -64,18 +64,17 @@ class Columns:
     """(G, n, n + 1) of each stretch: torque of each joint by weight and inertia of the links behind each joint and of
     1 kg at the end-effector [Nm], before the low-pass."""
     kick: FloatArray
-    """(N, n) noise of the measured velocities, as likely as it is, times the mass matrix [kg m^2 rad/s]; 0 without
-    velocities."""
+    """(N, n) expected noise of the measured velocities times the mass matrix [kg m^2 rad/s]; 0 without velocities."""
     velocity_noise: FloatArray
     """(N, n) measured velocities less derivatives of positions [rad/s]."""
     mass_square: FloatArray
     """(n, n) mean of the squares of the mass matrix [kg^2 m^4]."""
     calm: BoolArray
-    """(N,) samples in and shortly before which no joint's speed changes quickly: there its derivative is known."""
+    """(N,) true for samples without a quick change of a joint's speed in or shortly before them."""
 
 
 def columns_of(data: Usable, motions: list[ArmMotion], model: RobotModel) -> Columns:
-    """Work out all that does not depend on what is to be found."""
+    """Compute the parts that do not depend on the model's parameters."""
     s, n = data.samples, model.n
     kick, noise, calm = np.zeros(s.q.shape), np.zeros(s.q.shape), np.zeros(len(s.stamp), np.bool_)
     positions, speeds, carried, masses = [], [], [], []
@@ -94,7 +93,7 @@ def columns_of(data: Usable, motions: list[ArmMotion], model: RobotModel) -> Col
         positions.append(path(fine))
         speeds.append(path(fine, 1))
     if s.qd is not None and calm.any():
-        # part of what differs is the derivatives' own noise: on average this share is the velocities'
+        # the difference contains the derivatives' noise: on average this share belongs to the velocities
         share = np.maximum(1.0 - (motions[0].speed_noise / joint_scale(noise[calm])) ** 2, 0.0)
         for span, motion, M in zip(data.stretches, motions, masses, strict=True):
             kick[span] = np.einsum("tij,tj->ti", on_grid(s.stamp[span], motion.at[0], GRID_S, M), share * noise[span])
@@ -103,7 +102,7 @@ def columns_of(data: Usable, motions: list[ArmMotion], model: RobotModel) -> Col
 
 
 def _calm(motion: ArmMotion, time: FloatArray) -> BoolArray:
-    """Say which samples (N,) of a stretch are calm, and not among its first: there the low-pass still begins."""
+    """Return flags (N,) of the calm samples of a stretch, without its first ones, in which the low-pass settles."""
     quick = motion.quick.copy()
     quick[: round(_REMEMBERED_S / GRID_S)] = True
     before, after = round(motion.half_s / GRID_S), round(_REMEMBERED_S / GRID_S)
@@ -112,10 +111,10 @@ def _calm(motion: ArmMotion, time: FloatArray) -> BoolArray:
 
 
 def _noise(measured: FloatArray, speed: FloatArray, growth: FloatArray, calm: BoolArray) -> FloatArray:
-    """Noise (N, n) of measured velocities: what derivatives of the positions, and their growth, do not explain.
+    """Return the noise (N, n) of measured velocities: the part that derivatives of the positions do not explain.
 
-    A velocity that is measured late, or at the end of a control period of constant set-point, is off by so much of the
-    acceleration: that is no noise.
+    A velocity that is measured late, or at the end of a control period with a constant set-point, has an error
+    proportional to the acceleration `growth`. That error is no noise.
     """
     noise = np.zeros_like(speed)
     for j in range(speed.shape[1] if calm.any() else 0):
@@ -126,7 +125,7 @@ def _noise(measured: FloatArray, speed: FloatArray, growth: FloatArray, calm: Bo
 
 
 def _late(data: Usable, values: list[FloatArray], spacing: float, ahead: list[float], pole: float) -> FloatArray:
-    """Low-pass values (F, ...) of each stretch, so far apart [s], with one pole; at the samples (N, ...)."""
+    """Low-pass the values (F, ...) of each stretch, `spacing` [s] apart, with one pole; return them at the samples."""
     rows = []
     for span, each in zip(data.stretches, values, strict=True):
         time = data.samples.stamp[span]
@@ -136,13 +135,13 @@ def _late(data: Usable, values: list[FloatArray], spacing: float, ahead: list[fl
 
 
 def carried_late(data: Usable, columns: Columns, gain: float) -> FloatArray:
-    """Return `carried` at the samples (N, n, n + 1) after the low-pass, by the trapezoidal rule: it changes slowly."""
+    """Return `carried` at the samples (N, n, n + 1) after the low-pass, by the trapezoidal rule."""
     half = 0.5 * gain * GRID_S
     return _late(data, columns.carried, GRID_S, 2 * [half / (1.0 + half)], (1.0 - half) / (1.0 + half))
 
 
 def friction_parts(speed: FloatArray, steepness: FloatArray, asymmetry: FloatArray) -> tuple[FloatArray, ...]:
-    """Friction of F1 = 1 Nm at joint speeds (F, n), and its derivatives by ln F2 and F3.
+    """Return the friction for F1 = 1 Nm at joint speeds (F, n), and its derivatives by ln F2 and F3.
 
     sigma(F2 (qd + F3)) - sigma(F2 F3), the form of Gaz et al. 2019 with sigma the logistic function.
     """
@@ -154,20 +153,20 @@ def friction_parts(speed: FloatArray, steepness: FloatArray, asymmetry: FloatArr
 
 @value
 class ResidualFit:
-    """What was found; n joints, p = 6 n + n + 2 numbers."""
+    """Result of a fit with n joints and p = 6 n + n + 2 parameters."""
 
     numbers: FloatArray
     """(p,) six of each joint, then the relative errors of the links' masses [1], the payload [kg], and K' [1/s]."""
     errors: FloatArray
     """(p,) standard errors."""
     priors: FloatArray
-    """(p,) standard deviations before."""
+    """(p,) prior standard deviations."""
     gain: float
-    """K of the low-pass [1/s]."""
+    """Gain K of the low-pass [1/s]."""
     expected: FloatArray
-    """(N, n) what is explained [Nm], the velocities' noise not in it."""
+    """(N, n) explained torque [Nm], without the part of the velocities' noise."""
     kicked: FloatArray
-    """(N, n) what the velocities' noise explains [Nm]."""
+    """(N, n) torque explained by the velocities' noise [Nm]."""
 
     @property
     def payload(self) -> tuple[float, float]:
@@ -175,13 +174,13 @@ class ResidualFit:
         return float(self.numbers[-2]), float(self.errors[-2])
 
     def of_joints(self, which: FloatArray) -> FloatArray:
-        """Return numbers or errors (p,) of the joints as (n, 6)."""
+        """Return the part of numbers or errors (p,) that belongs to the joints as (n, 6)."""
         n = self.expected.shape[1]
         return which[: OWN * n].reshape(n, OWN)
 
 
 def fit(data: Usable, columns: Columns, used: BoolArray, usual: PlantParams, payload: bool = True) -> ResidualFit:
-    """Find all parts from the samples that are used (N,); without `payload` that stays 0."""
+    """Fit all parameters to the samples with `used` (N,); without `payload` the payload stays 0."""
     n, cycles = data.samples.q.shape[1], np.array(usual.ripple_cycles)
     start, priors = _begin(n, usual, payload)
     theta, gain = start.copy(), usual.observer_gain_1_s
@@ -199,7 +198,7 @@ def fit(data: Usable, columns: Columns, used: BoolArray, usual: PlantParams, pay
             H += weighted.T @ X[:, j]
             g += weighted.T @ left[:, j]
         step = np.linalg.solve(H, g)
-        # no farther than the linearisation of the friction's shape is good for
+        # within the range of the linearised friction's shape
         shape = (step / priors)[: OWN * n].reshape(n, OWN)[:, 2:4]
         step = step / max(float(np.abs(shape).max()) / _REACH, 1.0)
         theta = theta + step
@@ -217,7 +216,7 @@ def fit(data: Usable, columns: Columns, used: BoolArray, usual: PlantParams, pay
 
 
 def _begin(n: int, usual: PlantParams, payload: bool) -> tuple[FloatArray, FloatArray]:
-    """Return what is believed before, and its standard deviations."""
+    """Return the prior means (p,) and standard deviations (p,)."""
     own, spread = np.zeros((n, OWN)), np.zeros((n, OWN))
     own[:, 1] = (1.0 - usual.friction_compensated) * np.array(usual.friction_f1_nm)
     own[:, 2], own[:, 3] = np.log(usual.friction_f2_s_rad), np.array(usual.friction_f3_rad_s)
@@ -230,16 +229,16 @@ def _begin(n: int, usual: PlantParams, payload: bool) -> tuple[FloatArray, Float
 def design(
     data: Usable, columns: Columns, carried: FloatArray, theta: FloatArray, gain: float, cycles: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the derivatives (N, n, p) of the residual by all numbers, and what they explain (N, n) [Nm]."""
+    """Return the derivatives (N, n, p) of the residual by all parameters, and the explained torque (N, n) [Nm]."""
     count, n = data.samples.q.shape
     own = theta[: OWN * n].reshape(n, OWN)
     shapes = []
     for q, speed in zip(columns.q, columns.speed, strict=True):
         friction = friction_parts(speed, np.exp(own[:, 2]), own[:, 3])
         shapes.append(np.stack([*friction, np.sin(cycles * q), np.cos(cycles * q)], axis=1))
-    part = gain * _FINE_S / (1.0 + gain * _FINE_S)  # as the observer does
+    part = gain * _FINE_S / (1.0 + gain * _FINE_S)  # the discretisation of the observer
     late = _late(data, shapes, _FINE_S, [part], 1.0 - part)
-    late[:, 1:3] *= own[:, 1]  # derivatives by what the friction's F1 multiplies
+    late[:, 1:3] *= own[:, 1]  # derivatives of terms that F1 multiplies
     X = np.zeros((count, n, len(theta)))
     for j in range(n):
         X[:, j, OWN * j] = -1.0
@@ -253,7 +252,7 @@ def design(
 
 
 def _standard_errors(data: Usable, H: FloatArray, precision: FloatArray, score: FloatArray) -> FloatArray:
-    """Errors (p,) by the scores (N, p) of the samples, with the usual correction for the number of blocks."""
+    """Return standard errors (p,) from the scores (N, p), with the usual correction for the number of blocks."""
     time = data.samples.stamp
     block = ((time - time[0]) / BLOCK_S).astype(np.int64)
     scores = np.zeros((int(block.max()) + 1, score.shape[1]))

@@ -1,6 +1,6 @@
-"""From samples of an arm in free motion to what kind of arm it is, with standard errors.
+"""Identification of an arm from samples of free motion, with standard errors.
 
-What looks like a contact is no noise and is left out. The noise of the rest is of velocities and of torque sensors.
+Spans that look like contacts are left out. The noise of the rest is that of velocities and of torque sensors.
 """
 
 import numpy as np
@@ -16,15 +16,15 @@ from pretouch_lab.identification.recording import LEAST_S, ArmSamples, Usable, j
 
 _ROUNDS = 3
 _IDENTIFIED = 0.5
-"""A number is identified where its standard error is below this part of what was assumed before [1]."""
+"""Largest standard error of an identified number, as a fraction of its prior standard deviation [1]."""
 _MOST_MASS_ERROR = 0.5
-"""A link whose mass seems to be off by more than this, beyond doubt, is another arm's [1]."""
+"""Largest relative error of a link's mass [1]: more, beyond doubt, means a recording of another arm."""
 _CONTACT_SIGMAS, _CONTACT_S = 6.0, 0.15
-"""A mean over so long [s], so many of its own robust deviations off, is taken for a contact."""
+"""Threshold for a contact in robust deviations of a mean, and duration of the mean [s]."""
 _MARGIN_S = 0.5
-"""What is left out before and after a contact as well [s]."""
+"""Time left out before and after a contact [s]."""
 _MOST_CONTACTS = 0.3
-"""Of a recording in which more than this part looks like contacts nothing is identified."""
+"""Largest fraction of a recording that may look like contacts [1]."""
 _LEAST_BLOCKS = 8
 _LEAST_VELOCITY_RAD_S = 1e-5
 """Least noise of measured velocities that is reported [rad/s]."""
@@ -35,46 +35,46 @@ class Noise:
     """Standard deviations of the noise of n joints, with their standard errors."""
 
     torque_nm: FloatArray
-    """(n,) of the torque sensors, before the observer [Nm]."""
+    """(n,) noise of the torque sensors, before the observer [Nm]."""
     torque_errors_nm: FloatArray
     velocity_rad_s: float
-    """Of the measured velocities [rad/s]."""
+    """Noise of the measured velocities [rad/s]."""
     velocity_error_rad_s: float
 
 
 @value
 class Quantity:
-    """One number of each of n joints."""
+    """One parameter of each of n joints."""
 
     name: str
-    """With its unit."""
+    """Name with unit."""
     field: str
-    """Of `PlantParams`; '' for a number that stands there otherwise."""
+    """Field of `PlantParams`; '' for a parameter without a field of its own."""
     values: FloatArray
     standard_errors: FloatArray
     identified: BoolArray
-    """(n,) whether the recording tells it; else it stays near what is usual."""
+    """(n,) true where the recording determines the value; else it stays near its default."""
 
 
 @value
 class IdentifiedArm:
-    """What a recording of free motion tells of an arm with n joints."""
+    """An arm with n joints, identified from a recording of free motion."""
 
     fit: ResidualFit
     noise: Noise | None
-    """None without velocities: theirs is then in what is left of the torques, and the observer's gain stays."""
+    """None without velocities: the residuals then contain their noise, and the observer's gain keeps its default."""
     samples: ArmSamples
-    """Those used or left out."""
+    """All samples, used or left out."""
     spans: tuple[tuple[float, float], ...]
-    """From when to when something looked like a contact [s]."""
+    """Start and end of each span that looks like a contact [s]."""
     notes: tuple[str, ...]
     seconds: float
-    """Free motion that was used [s]."""
+    """Duration of the used free motion [s]."""
     usual: PlantParams
-    """The arm as it is taken to be without a recording."""
+    """Default parameters of the arm."""
 
     def of_joints(self) -> list[Quantity]:
-        """Return the numbers of the joints. The friction F1 is that which the interface does not compensate."""
+        """Return the parameters of the joints. The friction F1 is the part that the interface does not compensate."""
         own, errors = self.fit.of_joints(self.fit.numbers), self.fit.of_joints(self.fit.errors)
         clear = self.fit.errors < _IDENTIFIED * self.fit.priors
         of_own, steepness = clear[: own.size].reshape(own.shape), np.exp(own[:, 2])
@@ -97,11 +97,11 @@ class IdentifiedArm:
 
 
 def identify(samples: ArmSamples, model: RobotModel, usual: PlantParams) -> IdentifiedArm:
-    """Identify an arm. CalibrationError for a recording that cannot tell, with what is missing."""
+    """Identify an arm. Raises CalibrationError for an unsuitable recording, with the reason."""
     if samples.q.shape[1] != model.n or samples.tau.shape[1] != model.n:
         raise CalibrationError(
             f"The recording has {samples.q.shape[1]} joints and {samples.tau.shape[1]} torques, and"
-            f" {model.description.name} has {model.n} joints: give the arm it is of."
+            f" {model.description.name} has {model.n} joints: name the recorded arm by --arm."
         )
     data, motions = moved(usable(samples))
     columns, notes = columns_of(data, motions, model), [*data.notes]
@@ -109,8 +109,8 @@ def identify(samples: ArmSamples, model: RobotModel, usual: PlantParams) -> Iden
     even_s = float(used.sum()) * data.period
     if even_s < LEAST_S:
         raise CalibrationError(
-            f"The arm's speed changes so often that {even_s:.1f} s of even motion are left: record {LEAST_S:g} s or"
-            " more along smooth paths, or slower."
+            f"The arm's speed changes too often: {even_s:.1f} s of even motion are left. Record {LEAST_S:g} s or more"
+            " along smooth paths, or more slowly."
         )
     for _ in range(_ROUNDS):
         fitted = fit(data, columns, used, usual)
@@ -121,12 +121,12 @@ def identify(samples: ArmSamples, model: RobotModel, usual: PlantParams) -> Iden
         used = again
     if fitted.payload[0] < 0.0:
         fitted = fit(data, columns, used, usual, payload=False)
-        notes.append("The payload comes out below zero: it is 0, and the masses of the links take the rest.")
+        notes.append("The fitted payload is below zero: it is set to 0, and the masses of the links are fitted again.")
     seconds = float(used.sum()) * data.period
     if seconds < LEAST_S:
         raise CalibrationError(
-            f"Only {seconds:.1f} s of free motion are left without what looks like contacts: record {LEAST_S:g} s or"
-            " more."
+            f"Only {seconds:.1f} s of free motion are left without spans that look like contacts: record {LEAST_S:g} s"
+            " or more."
         )
     masses = slice(OWN * model.n, OWN * model.n + model.n)
     far = np.flatnonzero(np.abs(fitted.numbers[masses]) - 3.0 * fitted.errors[masses] > _MOST_MASS_ERROR)
@@ -148,10 +148,10 @@ def identify(samples: ArmSamples, model: RobotModel, usual: PlantParams) -> Iden
 
 
 def free_samples(data: Usable, fitted: ResidualFit) -> tuple[BoolArray, tuple[tuple[float, float], ...]]:
-    """Say which samples (N,) are of free motion, and from when to when [s] something else is.
+    """Return flags (N,) of the samples in free motion, and start and end of each other span [s].
 
-    What a contact does lasts longer than noise: means over `_CONTACT_S` are compared with how far such means usually
-    are off. CalibrationError if too much looks like that.
+    A contact lasts longer than noise: means over `_CONTACT_S` are compared with the usual deviation of such means.
+    Raises CalibrationError if too much of the recording looks like contacts.
     """
     stamp, left = data.samples.stamp, data.samples.tau - fitted.expected
     length = max(round(_CONTACT_S / data.period), 1)
@@ -181,15 +181,15 @@ def free_samples(data: Usable, fitted: ResidualFit) -> tuple[BoolArray, tuple[tu
 
 
 def noise_of(data: Usable, columns: Columns, fitted: ResidualFit, used: BoolArray, usual: PlantParams) -> Noise:
-    """Take the noise of the samples that are used (N,) apart, where velocities are measured.
+    """Separate the noise of torques and velocities in the samples with `used` (N,), if velocities are measured.
 
-    A first-order noise of corner a through the discrete low-pass of the observer, alpha = K dt / (1 + K dt), keeps the
-    part alpha / (2 - alpha) (1 + rho (1 - alpha)) / (1 - rho (1 - alpha)) of its variance, rho = exp(-a dt). What
-    earlier noise of the velocities left in the integral is taken off: K'^2 (M M^T)_jj alpha / (2 - alpha) of it; and
-    so is what the noise of the positions' derivatives, which is in what was taken for noise of the velocities, leaves.
+    The discrete low-pass of the observer, alpha = K dt / (1 + K dt), passes a first-order noise of corner a with the
+    fraction alpha / (2 - alpha) (1 + rho (1 - alpha)) / (1 - rho (1 - alpha)) of its variance, rho = exp(-a dt). Two
+    parts are subtracted: earlier noise of the velocities in the integral, K'^2 (M M^T)_jj alpha / (2 - alpha) of it,
+    and the noise of the positions' derivatives, which counts as noise of the velocities.
     """
     left = data.samples.tau - fitted.expected - fitted.kicked
-    # what is five deviations off is cut: one outlier would be most of a variance
+    # clipped at five deviations: one outlier could dominate a variance
     bound = 5.0 * joint_scale(left[used])
     square = np.clip(left - np.median(left[used], axis=0), -bound, bound) ** 2
     length = round(BLOCK_S / data.period)
@@ -200,7 +200,7 @@ def noise_of(data: Usable, columns: Columns, fitted: ResidualFit, used: BoolArra
             f"There are {len(whole)} stretches of {BLOCK_S:g} s without a break: the noise needs {_LEAST_BLOCKS}."
             " Record longer, along smoother paths, with nothing touching the arm."
         )
-    derivative = columns.motion[0].speed_noise ** 2  # is in what differs, too
+    derivative = columns.motion[0].speed_noise ** 2  # part of the difference
     noise = columns.velocity_noise[used]
     velocity = max(float(np.mean(joint_scale(noise) ** 2 - derivative)), _LEAST_VELOCITY_RAD_S**2)
     dt, gain = usual.period_s, fitted.gain

@@ -1,13 +1,13 @@
-"""How an arm moved: positions, speeds and accelerations from samples with noise and uneven stamps.
+"""Motion of an arm: positions, speeds and accelerations from samples with noise and uneven stamps.
 
-A cubic is fitted to the samples around each instant of a regular grid, near ones counting more (local polynomial
-regression; Savitzky and Golay's filter where samples are evenly spaced). Lost samples and stamps that are off only make
-it less sure: each estimate is a weighted sum of samples, so its noise follows from theirs. How wide the fit is follows
-from the noise: as narrow as that allows, for a wide one rounds a path's corners.
+A cubic is fitted to the samples around each instant of a regular grid, with larger weights near it (local polynomial
+regression; Savitzky and Golay's filter for evenly spaced samples). Lost samples and errors of stamps only increase the
+noise: each estimate is a weighted sum of samples, so its noise follows from theirs. The fit is as narrow as the noise
+allows, because a wide fit rounds a path's corners.
 
-An error of a stamp, as of a busy receiver, moves all joints of a sample along their speeds, as no noise of encoders
-does. So where the positions are too noisy for a narrow fit, stamps are moved to where the joints say that they were.
-Errors that last longer than the fit show in measured velocities: all joints seem faster or slower by the same part.
+An error of a stamp, as from a busy receiver, moves all joints of a sample along their speeds; encoder noise does not.
+If the positions are too noisy for a narrow fit, stamps are corrected by all joints together. Errors that last longer
+than the fit show in measured velocities: all joints seem faster or slower by the same fraction.
 """
 
 from dataclasses import replace
@@ -20,37 +20,37 @@ from pretouch.values import value
 from pretouch_lab.identification.recording import Usable, joint_scale
 
 GRID_S = 0.01
-"""Spacing of the instants at which the motion is estimated [s]."""
+"""Time between two instants of the estimated motion [s]."""
 HALVES_S = (0.06, 0.09, 0.13, 0.18, 0.25)
-"""Half the widths of the fit that are tried [s]: cutoffs of about 13 to 3 Hz."""
+"""Half widths of the fit to try [s]: cutoffs of about 13 to 3 Hz."""
 _LEAST = 6
-"""Samples that a cubic is fitted to at least; where they are sparse, as in a gap, the fit is wider."""
+"""Least number of samples for a cubic; the fit is wider where samples are sparse, as in a gap."""
 _SURE_RAD_S, _SURE_RAD_S2 = 0.002, 0.8
-"""Noise of speeds [rad/s] and accelerations [rad/s^2] that is strived for: a quarter of the noise of velocities that an
-arm measures, and a fifth of what is quick."""
+"""Target noise of speeds [rad/s] and accelerations [rad/s^2]: a quarter of the noise of an arm's measured velocities,
+and a fifth of `_QUICK_RAD_S2`."""
 _QUICK_RAD_S2 = 4.0
-"""Where a joint's speed changes faster than this [rad/s^2], as at a corner of a path, its speed is not known well."""
+"""Largest change of a joint's speed [rad/s^2] for an accurate speed; corners of a path exceed it."""
 _ROUNDED_RAD_S = 0.005
-"""A fit of half the width may tell a speed that differs by this [rad/s]: half of the noise of measured velocities."""
+"""Largest difference from a fit of half the width [rad/s]: half of the noise of measured velocities."""
 _SIGMAS = 6.0
-"""What is off by this many standard deviations is no noise [1]."""
+"""Largest deviation of noise in standard deviations [1]."""
 _DEGREE = 3
 _ROUNDS = 3
 _MOVING_RAD_S = 0.05
-"""Slower than this, all joints together, an arm does not tell errors of stamps [rad/s]."""
+"""Least speed of all joints together that shows errors of stamps [rad/s]."""
 _LEAST_MOVING = 200
-"""Samples of a moving arm that errors of stamps are judged by at least."""
+"""Least number of samples of a moving arm for an estimate of errors of stamps."""
 _MEDIAN_SQUARE = 0.455
 """Median of the square of normal noise of variance 1."""
 _PACE_HALF_S = 0.13
-"""Half the width of the fit that tells how much too fast or slow the stamps go [s]."""
+"""Half width of the fit of the stamps' pace [s]."""
 _MOST_PACE = 0.1
-"""How much too fast or slow stamps go at most [1]."""
+"""Largest relative error of the stamps' pace [1]."""
 
 
 @value
 class ArmMotion:
-    """How an arm with n joints moved in one stretch without a gap, at G instants, `GRID_S` apart."""
+    """Motion of an arm with n joints in one stretch without a gap, at G instants, `GRID_S` apart."""
 
     at: FloatArray
     """(G,) [s]."""
@@ -61,21 +61,21 @@ class ArmMotion:
     qdd: FloatArray
     """(G, n) [rad/s^2]."""
     quick: BoolArray
-    """(G,) where a speed changes faster than the fit follows, or where too few samples tell it."""
+    """(G,) true where a speed changes faster than the fit follows, or where samples are too few."""
     half_s: float
     """Half the width of the fit [s]."""
     noise: FloatArray
-    """(n,) standard deviation of the positions, errors of the stamps in it [rad]."""
+    """(n,) standard deviation of the positions, errors of stamps included [rad]."""
     speed_noise: FloatArray
-    """(n,) that of the speeds, usually [rad/s]."""
+    """(n,) typical standard deviation of the speeds [rad/s]."""
 
     def between(self) -> CubicHermiteSpline:
-        """Positions as a function of time, and by its derivative speeds."""
+        """Return positions as a function of time; its derivative is the speeds."""
         return CubicHermiteSpline(self.at, self.q, self.qd)
 
 
 def motions_of(times: list[FloatArray], positions: list[FloatArray]) -> list[ArmMotion]:
-    """Estimate the motion in stretches with stamps (N,) [s] and positions (N, n) [rad], all by a fit of one width."""
+    """Estimate the motion in stretches with stamps (N,) [s] and positions (N, n) [rad], with one width for all."""
     grids = [time[0] + GRID_S * np.arange(int((time[-1] - time[0]) / GRID_S) + 2) for time in times]
     samples = list(zip(times, positions, grids, strict=True))
     noise = position_noise(times, positions, HALVES_S[0])
@@ -97,7 +97,7 @@ def motions_of(times: list[FloatArray], positions: list[FloatArray]) -> list[Arm
 
 
 def position_noise(times: list[FloatArray], positions: list[FloatArray], half: float) -> FloatArray:
-    """Robust standard deviation (n,) [rad] of what a local cubic leaves, what it takes away of the noise put back."""
+    """Return the robust standard deviation (n,) [rad] of the noise, from the residuals of a local cubic."""
     rows = []
     for time, q in zip(times, positions, strict=True):
         (fitted, _, _), gains = local_cubic(time, q, time, half)
@@ -112,18 +112,18 @@ def local_cubic(time: FloatArray, values: FloatArray, at: FloatArray, half: floa
         time: (N,) increasing stamps [s].
         values: (N, c) samples.
         at: (G,) increasing instants [s].
-        half: samples nearer than this count [s]; where there are fewer than a handful, farther ones do.
+        half: samples nearer than this count [s]; the range grows to include at least `_LEAST` samples.
 
     Returns:
-        Value, first and second derivative (3, G, c), and (G, 4) the standard deviations of these three where that of
-        the samples is 1, and the weight of a sample at the very instant in the value.
+        Value, first and second derivative (3, G, c), and (G, 4): their standard deviations for samples with a standard
+        deviation of 1, and the weight of a sample at the instant itself in the value.
     """
     reach = np.maximum(half, 1.05 * _nearest(time, at))
     first, last = np.searchsorted(time, at - reach), np.searchsorted(time, at + reach)
     size = _DEGREE + 1
     moments, squares = np.zeros((2 * size - 1, len(at))), np.zeros((2 * size - 1, len(at)))
     right = np.zeros((size, len(at), values.shape[1]))
-    middle = values[np.clip(first, 0, len(time) - 1)]  # near to it sums lose no digits
+    middle = values[np.clip(first, 0, len(time) - 1)]  # offsets keep the sums accurate
     for k in range(int((last - first).max())):
         there = np.minimum(first + k, len(time) - 1)
         x = (time[there] - at) / reach
@@ -148,7 +148,7 @@ def local_cubic(time: FloatArray, values: FloatArray, at: FloatArray, half: floa
 
 
 def _nearest(time: FloatArray, at: FloatArray) -> FloatArray:
-    """Distance (G,) [s] within which `_LEAST` samples are, or all."""
+    """Return the distances (G,) [s] within which `_LEAST` samples are, or all."""
     count = min(_LEAST, len(time))
     place = np.searchsorted(time, at)
     ways = []
@@ -159,7 +159,7 @@ def _nearest(time: FloatArray, at: FloatArray) -> FloatArray:
 
 
 def moved(data: Usable) -> tuple[Usable, list[ArmMotion]]:
-    """Estimate the motion of each stretch; returns the samples as well, with better stamps if theirs are uneven."""
+    """Estimate the motion of each stretch; return the samples with corrected stamps as well."""
     s, spans, notes, off_s = data.samples, data.stretches, list(data.notes), 0.0
     positions, stamps = [s.q[span] for span in spans], [s.stamp[span] for span in spans]
     motions = motions_of(stamps, positions)
@@ -176,7 +176,7 @@ def moved(data: Usable) -> tuple[Usable, list[ArmMotion]]:
         stamps = _paced(stamps, [s.qd[span] for span in spans], motions)
         motions = motions_of(stamps, positions)
     if off_s > 0.0:
-        notes.append(f"Stamps are off by {1000.0 * off_s:.2g} ms, by what the joints say together: they are corrected.")
+        notes.append(f"Stamps are off by {1000.0 * off_s:.2g} ms, by all joints together: they are corrected.")
     if motions[0].half_s > HALVES_S[0]:
         notes.append(
             f"The positions' noise is {motions[0].noise.max():.2g} rad: speeds are of fits over"
@@ -188,9 +188,10 @@ def moved(data: Usable) -> tuple[Usable, list[ArmMotion]]:
 def _stamp_errors(
     stamps: list[FloatArray], positions: list[FloatArray], motions: list[ArmMotion]
 ) -> tuple[list[FloatArray], float]:
-    """Errors (N,) [s] that explain what positions are off along the speed, and their size; 0 where there are none.
+    """Return errors of stamps (N,) [s] from position errors along the speed, and their size, 0 without errors.
 
-    They are believed as far as they exceed what positions are off across the speed, and if most of the noise is theirs.
+    They are scaled by their share of the variance: position errors across the speed are noise. If less than half of the
+    noise along the speed is theirs, there are none.
     """
     n = positions[0].shape[1]
     paths = [motion.between() for motion in motions]
@@ -212,9 +213,9 @@ def _stamp_errors(
 
 
 def _paced(stamps: list[FloatArray], velocities: list[FloatArray], motions: list[ArmMotion]) -> list[FloatArray]:
-    """Stretch time where all joints are measured slower than their positions change, and the other way round.
+    """Stretch time where all joints are measured slower than their positions change, and compress it if faster.
 
-    That is believed as far as it exceeds what the velocities' noise does.
+    The correction is scaled by its share of the variance, beside the velocities' noise.
     """
     speeds = [motion.between()(time, 1) for time, motion in zip(stamps, motions, strict=True)]
     velocity = np.concatenate(velocities) - np.concatenate(speeds)
@@ -227,7 +228,7 @@ def _paced(stamps: list[FloatArray], velocities: list[FloatArray], motions: list
         pace.append(sums[:, 0] / square)
         spread.append(noise * gains[:, 0] ** 2 / square)
     each, own = np.concatenate(pace), np.concatenate(spread)
-    usual = float(np.median(each))  # velocities that are all reported too large are no matter of time
+    usual = float(np.median(each))  # a constant factor of all velocities is no error of time
     moving = (np.concatenate(speeds) ** 2).sum(axis=1) > _MOVING_RAD_S**2
     variance = float(np.median((each - usual)[moving] ** 2 - _MEDIAN_SQUARE * own[moving])) / _MEDIAN_SQUARE
     if variance <= 0.0:

@@ -1,4 +1,4 @@
-"""Joint positions, velocities and torques of an arm in free motion: how they are read, and which of them are used."""
+"""Joint positions, velocities and torques of an arm in free motion: reading, and choice of usable samples."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -19,47 +19,47 @@ from pretouch.values import value
 Sign = Literal["on-robot", "by-robot"]
 
 LEAST_S = 20.0
-"""Shortest free motion that is used [s]: the noise takes as long to be separated from friction."""
+"""Shortest free motion [s]: the fit needs it to separate noise from friction."""
 _LEAST_MOVED_RAD = 0.1
-"""A recording is of an arm that moves if a joint turns by this [rad]."""
+"""Least motion of a joint in a recording of a moving arm [rad]."""
 _GAP_PERIODS, _BRIDGED_S = 3.5, 0.1
-"""Samples further apart than both [s] have a gap between them; less is interpolated."""
+"""Longest time between two samples without a gap, in periods and in seconds; shorter breaks are interpolated."""
 _LEAST_STRETCH_S = 1.0
 _HIGHEST_HZ = 250.0
-"""Rate above which samples are left out [Hz]: the observer's low-pass leaves nothing up there to learn from."""
+"""Highest rate [Hz]: more samples are left out, as the observer's low-pass removes faster signals."""
 _LOWEST_HZ, _LEAST_OBSERVED_HZ = 40.0, 400.0
-"""Rates at which samples, and measured torques for an observer to be run over them, have to come [Hz]."""
+"""Least rates of samples, and of measured torques for an observer [Hz]."""
 _OBSERVER_GAIN_1_S = 60.0
-"""Of that observer [1/s]."""
+"""Gain of that observer [1/s]."""
 
 
 @value
 class ArmSamples(JointTrace):
-    """What an arm with n joints said of its motion and of the torques on it, by time. T samples."""
+    """Motion and torques reported by an arm with n joints. T samples."""
 
     qd: FloatArray | None
-    """(T, n) measured joint velocities [rad/s] of the same instants; None where there are none."""
+    """(T, n) measured joint velocities [rad/s] of the same instants; None without velocities."""
     tau: FloatArray
-    """(T, n) external torques on the robot by its environment as estimated [Nm]."""
+    """(T, n) estimated external torques on the robot by its environment [Nm]."""
 
     def numbers(self) -> list[FloatArray]:
-        """Return all that is measured (T, n)."""
+        """Return all measured arrays (T, n)."""
         return [each for each in (self.q, self.tau, self.qd) if each is not None]
 
 
 def read_free_motion(
     place: Path, model: RobotModel | None, sign: Sign = "on-robot"
 ) -> tuple[ArmSamples, RobotModel, str]:
-    """Read a recording; return samples, the arm, and what was taken from where as a sentence.
+    """Read a recording; return samples, the arm, and a sentence on their source.
 
     Args:
-        place: a recording of ours, or a CSV or Parquet file with time_s, q1_rad ..., perhaps dq1_rad_s ..., and
+        place: a recording of Pretouch, or a CSV or Parquet file with time_s, q1_rad ..., optionally dq1_rad_s ..., and
             tau_ext1_Nm ... (external torques) or tau1_Nm ... (measured torques, gravity in them).
-        model: the arm; None: what the recording says, or a Panda.
-        sign: whose torques those of a CSV file are.
+        model: the arm; None: the arm of the recording, or a Panda.
+        sign: sign of the torques of a CSV file.
 
     Raises:
-        RecordingError: for what cannot be read, and for what is not clear, with the way out.
+        RecordingError: for an unreadable or ambiguous recording, with the way out.
     """
     if place.suffix.lower() in (*TABLES, PARQUET):
         log = open_log(place, Choice(arm=model or "auto")).torques()
@@ -70,7 +70,7 @@ def read_free_motion(
         arm, states = recorded.runs[0].model, [cycle.inputs.robot for cycle in recorded if cycle.inputs]
         if model is not None and model.description.name != arm.description.name:
             raise RecordingError(
-                f"{place} is of {arm.description.name}, and --arm is {model.description.name}: leave out --arm."
+                f"{place} is of {arm.description.name}, and --arm is {model.description.name}: omit --arm."
             )
         if not states:
             raise RecordingError(f"{place} holds no state of the robot: give another recording.")
@@ -78,7 +78,7 @@ def read_free_motion(
         received = ArmSamples(*(np.array([getattr(state, name) for state in states]) for name in names))
         samples = received.at(np.append(True, np.diff(received.stamp) > 0.0))  # a repeated state counts once
         sentence = f"{place}: states of {arm.description.name} as the controller had them"
-    if samples.q.shape[1] == arm.n:  # `identify` says it otherwise
+    if samples.q.shape[1] == arm.n:  # `identify` raises the error for other numbers
         check_reach(place, samples.q, arm)
     return samples, arm, sentence
 
@@ -113,7 +113,7 @@ class Usable:
     samples: ArmSamples
     stretches: tuple[slice, ...]
     notes: tuple[str, ...]
-    """What was left out."""
+    """Sentences on samples that are left out."""
 
     @property
     def period(self) -> float:
@@ -122,9 +122,9 @@ class Usable:
 
 
 def usable(samples: ArmSamples) -> Usable:
-    """Leave out what is no number, thin out what is faster than needed, and part it at gaps.
+    """Leave out samples that are not finite or too frequent, and split the rest at gaps.
 
-    CalibrationError for what is too short, too slow or stands still, with what is missing.
+    Raises CalibrationError for a recording that is too short or too slow, or of a standing arm.
     """
     notes: list[str] = []
 
@@ -140,13 +140,13 @@ def usable(samples: ArmSamples) -> Usable:
     later = np.append(np.diff(np.maximum.accumulate(samples.stamp)) > 0.0, True)
     samples = chosen(samples, later, "do not come after the one before them")
     turned = np.ptp(samples.q, axis=0).max()
-    if turned >= _LEAST_MOVED_RAD:  # states of a moving arm that are the same to the last bit are old
+    if turned >= _LEAST_MOVED_RAD:  # equal states of a moving arm are repeated reports
         new = np.any([(np.diff(each, axis=0) != 0.0).any(axis=1) for each in samples.numbers()], axis=0)
         samples = chosen(samples, np.append(True, new), "repeat the one before them")
     rate = 1.0 / float(np.median(np.diff(samples.stamp)))
     if rate < _LOWEST_HZ:
         raise CalibrationError(
-            f"The samples come at {rate:.3g} Hz: what an observer says changes within 20 ms, so record at"
+            f"The samples come at {rate:.3g} Hz, and the output of an observer changes within 20 ms: record at"
             f" {_LOWEST_HZ:g} Hz or more."
         )
     every = int(np.ceil(rate / _HIGHEST_HZ - 0.05))  # stamps are not exact
@@ -165,8 +165,8 @@ def usable(samples: ArmSamples) -> Usable:
         )
     if turned < _LEAST_MOVED_RAD:
         raise CalibrationError(
-            f"The arm stands: no joint turns by more than {turned:.2g} rad. Friction, masses and ripple show in motion"
-            f" only: record an arm whose joints turn by {_LEAST_MOVED_RAD:g} rad and more."
+            f"The arm stands: no joint turns by more than {turned:.2g} rad. Friction, masses and ripple show only in"
+            f" motion: record an arm whose joints turn by {_LEAST_MOVED_RAD:g} rad or more."
         )
     ends = np.cumsum([0, *(b - a for a, b in edges)]).tolist()
     samples = samples.at(np.concatenate([np.arange(a, b) for a, b in edges]))
