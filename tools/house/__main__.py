@@ -23,10 +23,25 @@ _PACKAGES = {
 }
 _TESTS = ("tests", "fci/tests", "ros2/tests", "lab/tests")
 _CORE_FOLDERS = ("control", "contact", "perception", "robot", "sensing", "params")
-_RIM = frozenset({
-    "__init__", "atomic_write", "errors", "extras", "loop", "plain_text", "plugins", "ports", "realtime", "shielding",
-    "signals", "source_digest", "text_table", "toml_files", "traces",
-})  # fmt: skip
+_RIM = frozenset(
+    {
+        "__init__",
+        "atomic_write",
+        "errors",
+        "extras",
+        "loop",
+        "plain_text",
+        "plugins",
+        "ports",
+        "realtime",
+        "shielding",
+        "signals",
+        "source_digest",
+        "text_table",
+        "toml_files",
+        "traces",
+    }
+)
 """Modules at the top of the product that are no part of the core."""
 
 

@@ -10,9 +10,22 @@ from pathlib import Path
 
 import grimp
 
-PARTICIPLES = frozenset({
-    "found", "said", "told", "made", "kept", "given", "asked", "wanted", "known", "shown", "taken", "held",
-})  # fmt: skip
+PARTICIPLES = frozenset(
+    {
+        "found",
+        "said",
+        "told",
+        "made",
+        "kept",
+        "given",
+        "asked",
+        "wanted",
+        "known",
+        "shown",
+        "taken",
+        "held",
+    }
+)
 """Names of variables that say what was done to a value and not what it is."""
 
 

@@ -14,9 +14,11 @@ from tools.site.navigation import navigation
 
 ROOT = Path(__file__).parents[2]
 _BESIDE = {
-    "CONTRIBUTING.md": "contributing.md", "SECURITY.md": "security.md", "CHANGELOG.md": "changelog.md",
+    "CONTRIBUTING.md": "contributing.md",
+    "SECURITY.md": "security.md",
+    "CHANGELOG.md": "changelog.md",
     "fci/README.md": "pretouch-fci.md",
-}  # fmt: skip
+}
 """Documents outside `docs`, and the pages that they become."""
 
 

@@ -2,6 +2,7 @@
 
 import mujoco
 import numpy as np
+from numpy.random import Generator
 
 from pretouch.compiled import compiled
 from pretouch.sensing.sensor import Capacitive, cone_rays
@@ -56,9 +57,8 @@ class Electrode:
     """One in a simulated room, with a baseline of its own that drifts."""
 
     def __init__(
-        self, sensor: Capacitive, body: int, T_body: FloatArray, data: mujoco.MjData, geoms: Geoms,
-        rng: np.random.Generator,
-    ) -> None:  # fmt: skip
+        self, sensor: Capacitive, body: int, T_body: FloatArray, data: mujoco.MjData, geoms: Geoms, rng: Generator
+    ) -> None:
         """Mount it at T_body (4, 4) on one of MuJoCo's bodies; `rng` says how it drifts."""
         rays = cone_rays(RINGS, sensor.angle)
         self._sensor, self._rng = sensor, rng

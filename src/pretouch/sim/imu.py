@@ -121,10 +121,9 @@ class Imus:
         root = plant.mj_model.body_rootid[link].astype(np.int64)
         # views into the simulation's memory, taken once
         bodies = _Bodies(data.xpos, data.xmat, data.subtree_com, data.cvel, data.cacc)
-        self._imus = _ImusOnLinks(
-            bodies, link, root, skin.T_link_board[skin.first], self.rate, mix, bias, noise, imu_counts(params), follow,
-            dt, np.full((count, 6), np.nan), due, np.zeros((most, 8)),
-        )  # fmt: skip
+        places, errors = (bodies, link, root, skin.T_link_board[skin.first]), (mix, bias, noise, imu_counts(params))
+        buffers = np.full((count, 6), np.nan), due, np.zeros((most, 8))
+        self._imus = _ImusOnLinks(*places, self.rate, *errors, follow, dt, *buffers)
         self._qvel, self._last_qvel = data.qvel, data.qvel.copy()
         plant.before_each_step(self._sample)
 

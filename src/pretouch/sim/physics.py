@@ -93,27 +93,23 @@ def memory_of(
     nominal, scratch = model.scratch
     state = np.zeros((8, model.n))
     state[SPRING] = state[BIAS] = bias
+    motion = data.qpos[own], data.qvel[own], data.qacc[own], data.qfrc_applied[own]
+    friction, ripple = (p.friction_f1_nm, p.friction_f2_s_rad, p.friction_f3_rad_s), (p.ripple_nm, p.ripple_cycles)
     return ArmMemory(
         p=p.numbers,
-        world=Simulation(
-            built._address, data._address, data.qpos[own], data.qvel[own], data.qacc[own], data.qfrc_applied[own],
-            data.sensordata[counted : counted + 1],
-        ),
+        world=Simulation(built._address, data._address, *motion, data.sensordata[counted : counted + 1]),
         nominal=NominalModel(nominal._address, scratch._address, scratch.qpos, scratch.qvel),
         follow=1.0 - float(np.exp(-2 * np.pi * p.set_point_hz * p.period_s)),
         keep=float(np.exp(-2 * np.pi * p.torque_noise_hz * p.period_s)),
         turn=2 * np.pi * p.ring_hz * p.period_s,
-        figures=np.array([
-            model.description.tau_max, p.friction_f1_nm, p.friction_f2_s_rad, p.friction_f3_rad_s, p.ripple_nm,
-            p.ripple_cycles, phase,
-        ]),
+        figures=np.array([model.description.tau_max, *friction, *ripple, phase]),
         impedance=np.zeros((3, model.n)),
         offset=zero.copy(),
         cold=np.array([p.cold_friction]),
         report=np.array([q, zero, q_d, zero, zero]),
         state=state,
         mass_matrix=mass,
-    )  # fmt: skip
+    )
 
 
 Q, QD, Q_D, QD_SET, EXTERNAL = range(5)

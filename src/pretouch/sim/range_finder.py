@@ -81,6 +81,9 @@ class RangeSample(NamedTuple):
     """SPADs in use."""
 
 
+Send = Callable[[RangeSample], None]
+
+
 class RangeFinders:
     """All sensors of a skin in a simulated room: the port `SkinPort`, sampled and held.
 
@@ -89,9 +92,8 @@ class RangeFinders:
     """
 
     def __init__(
-        self, plant: ArmInWorld, skin: Skin, params: RangeFinderParams, seed: int,
-        send: Callable[[RangeSample], None] | None = None,
-    ) -> None:  # fmt: skip
+        self, plant: ArmInWorld, skin: Skin, params: RangeFinderParams, seed: int, send: Send | None = None
+    ) -> None:
         """Mount the sensors on a simulated arm; the seed decides offsets, phases, noise and losses.
 
         With `send`, that is handed each measurement as it is made and has to bring it to where it is read: latency,

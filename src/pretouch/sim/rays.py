@@ -39,10 +39,8 @@ def geoms_of(model: mujoco.MjModel, data: mujoco.MjData) -> Geoms:
     alpha = np.where(own, model.geom_rgba[:, 3], 0.0)
     if not own.all():
         alpha[~own] = model.mat_rgba[model.geom_matid[~own], 3]
-    return Geoms(
-        np.flatnonzero(alpha), model.geom_type, model.geom_bodyid, model.geom_size, model.geom_rbound, data.geom_xpos,
-        data.geom_xmat, model._address, data._address,
-    )  # fmt: skip
+    shapes = np.flatnonzero(alpha), model.geom_type, model.geom_bodyid, model.geom_size, model.geom_rbound
+    return Geoms(*shapes, data.geom_xpos, data.geom_xmat, model._address, data._address)
 
 
 @kernel

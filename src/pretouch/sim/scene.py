@@ -149,11 +149,9 @@ def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel
     pairs += [(thing, link) for thing in still for link in moving_2]
     if spec.hand:
         pairs += [(thing, "hand") for thing in [*still, *still_2, *stiffness] if thing != "hand"]
+    friction, impedance = [0.5, 0.5, 0.005, 0.0001, 0.0001], [_IMPEDANCE, _IMPEDANCE, 0.001, 0.5, 2.0]
     for one, other in pairs:
-        mj.add_pair(
-            geomname1=one, geomname2=other, condim=3, friction=[0.5, 0.5, 0.005, 0.0001, 0.0001],
-            solimp=[_IMPEDANCE, _IMPEDANCE, 0.001, 0.5, 2.0],
-        )  # fmt: skip
+        mj.add_pair(geomname1=one, geomname2=other, condim=3, friction=friction, solimp=impedance)
     found_flag = 1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND)
     mj.add_sensor(name=CONTACTS, type=mujoco.mjtSensor.mjSENS_CONTACT, intprm=[found_flag, 0, 1])
     built = mj.compile()
@@ -214,10 +212,9 @@ def body_before_second(built: mujoco.MjModel) -> int:
 
 def _add_pedestal(mj: mujoco.MjSpec, name: str, spec: SceneSpec, at: tuple[float, float, float]) -> None:
     x, y, z = at
-    mj.worldbody.add_geom(
-        name=name, type=mujoco.mjtGeom.mjGEOM_CAPSULE, fromto=[x, y, spec.floor_height, x, y, z - spec.pedestal_radius],
-        size=[spec.pedestal_radius, 0, 0], contype=0, conaffinity=0,
-    )  # fmt: skip
+    axis, size = [x, y, spec.floor_height, x, y, z - spec.pedestal_radius], [spec.pedestal_radius, 0, 0]
+    capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
+    mj.worldbody.add_geom(name=name, type=capsule, fromto=axis, size=size, contype=0, conaffinity=0)
 
 
 def _add_cable(mj: mujoco.MjSpec, model: RobotModel, params: PlantParams) -> None:
