@@ -2,7 +2,7 @@
 
     python -m tools.holder build/holder
 
-Both parts are sums and differences of boxes, so a mesh of exactly their surface is made without a geometry kernel.
+Both parts are sums and differences of boxes, so their exact mesh needs no geometry kernel.
 """
 
 import argparse
@@ -14,30 +14,30 @@ import numpy as np
 import trimesh
 
 Box = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
-"""From and to along x, y and z [mm]."""
+"""Start and end along x, y and z [mm]."""
 
 
 @dataclass(frozen=True)
 class Holder:
-    """Sizes [mm]; the lid lies beside the tray, both as they are printed, without supports."""
+    """Sizes [mm] of tray and lid, both printed without supports."""
 
     length: float = 66.0
-    """Room inside, along the strap's slots; the corner posts leave 54 mm for a board."""
+    """Inner length, along the strap's slots; the corner posts leave 54 mm for a board."""
     width: float = 34.0
-    """Room inside, across: a cell of 500 mAh is 30 to 32 mm wide."""
+    """Inner width: a cell of 500 mAh is 30 to 32 mm wide."""
     height: float = 16.0
-    """Room inside, above the floor: cell, foam and board one above the other."""
+    """Inner height above the floor, for cell, foam and board on top of each other."""
     wall: float = 2.0
     """Thickness of walls, floor and lid."""
     strap: float = 25.0
     """Width of the hook-and-loop strap that ties the holder to the link."""
     screw: float = 2.2
-    """Width of a slot that an M2 screw passes."""
+    """Width of a slot for an M2 screw."""
     pilot: float = 1.7
-    """Width of a square hole that an M2 screw cuts its thread into."""
+    """Width of a square hole in which an M2 screw cuts its thread."""
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be printed or fitted."""
+        """Raise SystemExit for sizes that cannot be printed or assembled."""
         for field in fields(self):
             value = getattr(self, field.name)
             if not 0.5 <= value <= 200.0:
@@ -63,7 +63,7 @@ class Holder:
         return solid(body, away[:1], posts, away[1:])
 
     def lid(self) -> trimesh.Trimesh:
-        """Return the lid: both sensors are screwed on top of it, so that nothing stands before the range finder."""
+        """Return the lid: both sensors are screwed on top, so that nothing covers the range finder."""
         x, y, w = self.length / 2, self.width / 2, self.wall
         away: list[Box] = [((-4.0, 4.0), (-2.5, 2.5), (0, w))]  # wires
         for sx, sy in product((-1, 1), repeat=2):
@@ -82,7 +82,7 @@ def _side(sign: int, near: float, far: float) -> tuple[float, float]:
 
 
 def solid(*steps: list[Box]) -> trimesh.Trimesh:
-    """Mesh of boxes that are put down, taken away, put down, ... in turn; watertight, normals outwards."""
+    """Return the watertight mesh of boxes that are added and subtracted in turn, with outward normals."""
     boxes = np.array([box for step in steps for box in step], dtype=float)
     edges = [np.unique(boxes[:, axis]) for axis in range(3)]
     full = np.zeros([len(edge) + 1 for edge in edges], dtype=bool)  # cells between edges, and empty ones around
@@ -103,7 +103,7 @@ def solid(*steps: list[Box]) -> trimesh.Trimesh:
 
 
 def _quad(cell: np.ndarray, axis: int, edges: list[np.ndarray], sign: int) -> list[list[float]]:
-    """Return the corners of a cell's upper face along an axis, seen from outside against the clock."""
+    """Return the corners of a cell's upper face along an axis, counterclockwise from outside."""
     one, two = (axis + 1) % 3, (axis + 2) % 3
     loop = [(0, 0), (1, 0), (1, 1), (0, 1)]
     corners = []

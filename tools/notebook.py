@@ -1,4 +1,4 @@
-"""Runs a notebook and keeps what its cells print and draw, and writes it as a page.
+"""Runs a notebook, stores the outputs of its cells, and writes it as a page.
 
     python -m tools.notebook docs/tutorial/first-contact.ipynb
 
@@ -18,7 +18,7 @@ import matplotlib as mpl
 from matplotlib import pyplot as plt
 
 Cell = dict[str, Any]
-"""A cell as the file has it (nbformat 4)."""
+"""A cell in the format of the file (nbformat 4)."""
 
 
 def cells_of(notebook: Path) -> list[Cell]:
@@ -43,7 +43,7 @@ def outputs_of(cells: list[Cell]) -> list[list[Cell]]:
 
 
 def _drawn(figure: Any) -> Cell:
-    """A figure as an output; its title is what it says in words."""
+    """Return a figure as an output; its title is the text for readers without images."""
     drawn = io.BytesIO()
     figure.savefig(drawn, format="png", dpi=80, metadata={"Software": None})
     data = {"image/png": base64.b64encode(drawn.getvalue()).decode(), "text/plain": [figure.get_suptitle()]}

@@ -1,10 +1,10 @@
-"""README's moving picture: the live page's opening, drawn from a recording by the page of a recording.
+"""The animation of README: the opening of the live page, drawn from a recording.
 
     python -m tools.picture record build/opening.mcap
     python -m tools.picture draw build/opening.mcap docs/images/opening.webp
 
-It takes what the tests of the page take, `make browser` and a Chromium, and a few minutes. The browser draws one frame
-after the other, so a slow machine draws the same picture.
+It needs the packages of the page's tests, `make browser` and a Chromium, and a few minutes. The browser draws one frame
+after the other, so a slow machine draws the same animation.
 """
 
 import io
@@ -28,10 +28,10 @@ from pretouch.recording.reader import Recorded
 from pretouch.sensing.skin import LIVE_SKIN
 
 FROM_S, TO_S, FRAMES_PER_S = 2.2, 10.2, 10
-"""Part of the opening that is shown, in the simulation's time [s]: from the hand's setting out on."""
+"""Start and end of the animation in the simulation's time [s], from the first motion of the hand, and its rate."""
 WIDTH_PX, HEIGHT_PX = 720, 450
 _EDGE_PX = 20
-"""Width of what the panel casts to its left [px]."""
+"""Width of the panel's shadow to its left [px]."""
 _FOV, _LOOK_AT = 0.62, (0.25, 0.22, 0.31)
 _STYLE = """
     div#caption {position: fixed !important; left: 385px; top: 14px !important; width: 320px}
@@ -44,7 +44,7 @@ _CAPTION = """() => {
     caption.id = 'caption';
     caption.replaceChildren(document.getElementById('status').cloneNode(true));
 }"""
-"""Word and sentence, large and over the scene: beside it, in the panel, they are too small for a picture."""
+"""Script that shows word and sentence large over the scene: in the panel they are too small for an animation."""
 
 
 def record(place: Path, until: float = TO_S) -> None:
@@ -59,7 +59,7 @@ def record(place: Path, until: float = TO_S) -> None:
 
 
 def drawn(recorded: Recorded, times: Sequence[float]) -> Iterator[Image.Image]:
-    """Draw a recording at some times on its steps' clock [s], which grow."""
+    """Draw a recording at increasing times on the clock of its steps [s]."""
     options = ServeOptions(port=free_port())
     with served(options, "Pretouch") as server, chromium(WIDTH_PX + PANEL_PX + _EDGE_PX, HEIGHT_PX) as visitor:
         page = ReplayPage(server, recorded)
@@ -69,7 +69,7 @@ def drawn(recorded: Recorded, times: Sequence[float]) -> Iterator[Image.Image]:
         visitor.page.add_style_tag(content=_STYLE)
         for number, time in enumerate(times):
             page.player.seek(time - recorded.stamps()[0])
-            # the first time sends the arm's colours, the second shows them: to the page these are seconds
+            # the first call sends the arm's colours, the second shows them
             for now in (2 * number, 2 * number + 1):
                 page.draw(float(now))
                 visitor.wait_for("rates", f"{page.player.time:.2f} of ")
@@ -78,7 +78,7 @@ def drawn(recorded: Recorded, times: Sequence[float]) -> Iterator[Image.Image]:
 
 
 def _settled(visitor: Visitor) -> bytes:
-    """Return what the page shows once it no longer changes."""
+    """Return a screenshot of the page after its last change."""
     visitor.page.evaluate(_CAPTION)
     clip, before, shot = {"x": 0, "y": 0, "width": WIDTH_PX, "height": HEIGHT_PX}, None, b""
     while shot != before:
@@ -87,7 +87,7 @@ def _settled(visitor: Visitor) -> bytes:
 
 
 def write(frames: Sequence[Image.Image], place: Path) -> None:
-    """Write frames as a picture that moves for ever, in real time."""
+    """Write frames as an animation in real time that repeats for ever."""
     more = {"duration": round(1000 / FRAMES_PER_S), "loop": 0, "quality": 75, "method": 6}
     frames[0].save(place, save_all=True, append_images=frames[1:], **more)
 

@@ -1,4 +1,4 @@
-"""Makes `vl53l5cx.bin` for a unit of the header `vl53l5cx_buffers.h` in ST's driver, which is ST's to give.
+"""Makes `vl53l5cx.bin` for a unit from the header `vl53l5cx_buffers.h` of ST's driver, which only ST distributes.
 
 python tools/vl53l5cx_bin.py vl53l5cx_buffers.h build/unit/vl53l5cx.bin
 """
@@ -13,7 +13,7 @@ _COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
 
 
 def program_of(header: str) -> bytes:
-    """Return the file a unit loads, from the text of ST's header; what is not in it is a ValueError."""
+    """Return the file for a unit from the text of ST's header. Raises ValueError for a missing array."""
     text = _COMMENT.sub("", header)
     return MARK + b"".join(_array(text, name, size) for name, size in _ARRAYS.items())
 
@@ -24,12 +24,12 @@ def _array(text: str, name: str, size: int) -> bytes:
         raise ValueError(f"There is no array ..._{name}: give vl53l5cx_buffers.h of ST's driver (STSW-IMG023).")
     values = bytes(int(word, 0) for word in re.findall(r"\w+", match.group(1)))
     if len(values) != size:
-        raise ValueError(f"The array ..._{name} has {len(values)} bytes, not {size}: take version 2.0 of ST's driver.")
+        raise ValueError(f"The array ..._{name} has {len(values)} bytes, not {size}: use version 2.0 of ST's driver.")
     return values
 
 
 def main(arguments: list[str]) -> int:
-    """Make the file."""
+    """Write the file."""
     if len(arguments) != 2:
         print(__doc__)
         return 2

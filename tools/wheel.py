@@ -1,7 +1,7 @@
 """Build a wheel with machine code, so that an installation compiles nothing: `python -m tools.wheel`.
 
-It is Numba's own cache, for one Python, one Numba and processors of the level `compiled.LEVEL`. On others, and with
-another Numba, the first start compiles as it does in a clone, and says so.
+The code is Numba's own cache, for one Python, one Numba and processors of the level `compiled.LEVEL`. With another
+Numba or processor the first start compiles, as in a clone, and prints that it does.
 """
 
 import os

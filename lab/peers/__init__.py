@@ -1,1 +1,1 @@
-"""Pretouch and its peers on the same problem: see docs/explanation/peers.md; `python -m lab.peers`, of a clone."""
+"""Comparison of Pretouch with its peers on one problem: docs/explanation/peers.md; `python -m lab.peers` in a clone."""

@@ -3,8 +3,8 @@
     python -m lab.peers --set-up               # installs the peers under .venv/peers, and measures
     python -m lab.peers --json results.json
 
-Each peer runs in an environment and a process of its own, without Pretouch; one that is not installed is left out and
-named. What is compared, and how it is checked that it is the same problem, stands in docs/explanation/peers.md.
+Each peer runs in an environment and a process of its own, without Pretouch. The program names peers that are not
+installed, and leaves them out. docs/explanation/peers.md describes the problem and the check that all peers solve it.
 """
 
 import argparse
@@ -34,11 +34,11 @@ ROOT = Path(__file__).resolve().parents[2]
 PEERS = ("mink", "pink")
 REFERENCE = "ours, rows"
 SNAPSHOTS, BUDGET_S, SEED = 300, 0.1, 0
-"""Of a problem; CPU time of one turn of a contender; of the problems."""
+"""Snapshots of a problem, CPU time of one block of a contender [s], and seed of the problems."""
 TOLERANCE = 1e-6
 """Largest difference of two answers to the same problem [rad/s]."""
 _FOR_P999 = 1000
-"""Samples below which no p99.9 is shown."""
+"""Least number of samples for a p99.9."""
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 Row = dict[str, Any]
 
@@ -49,7 +49,7 @@ def python_of(peer: str) -> Path:
 
 
 def set_up(peer: str) -> None:
-    """Make an environment for a peer if it has none. Pretouch is not installed in it, so no versions can clash."""
+    """Create an environment for a peer, if it has none, without Pretouch, so that no versions can clash."""
     folder = python_of(peer).parents[1]
     if folder.exists():
         return
@@ -59,7 +59,7 @@ def set_up(peer: str) -> None:
         needs = Path(__file__).with_name(f"{peer}.txt")
         subprocess.run([python_of(peer), "-m", "pip", "install", "--quiet", "-r", needs], check=True)  # noqa: S603
     except BaseException:
-        shutil.rmtree(folder)  # half an environment must not be taken for one
+        shutil.rmtree(folder)  # an incomplete environment must not remain
         raise
 
 
@@ -78,16 +78,14 @@ class Worker:
             self.process.stdin.flush()
             return json.loads(self.process.stdout.readline())
         except (BrokenPipeError, json.JSONDecodeError):
-            raise SystemExit(f"The process of {self.peer} ended: its message stands above.") from None
+            raise SystemExit(f"The process of {self.peer} ended: see its message above.") from None
 
 
 @contextmanager
 def worker(peer: str, python: str, folder: Path) -> Iterator[Worker]:
-    """Start the worker of a peer, on one thread, and end it in the end."""
-    command, environment = (
-        [python, "-m", "lab.peers.worker", peer, str(folder)],
-        os.environ | dict.fromkeys(_THREADS, "1"),
-    )
+    """Start the worker of a peer on one thread; terminate it at the end of the block."""
+    command = [python, "-m", "lab.peers.worker", peer, str(folder)]
+    environment = os.environ | dict.fromkeys(_THREADS, "1")
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
     with subprocess.Popen(command, cwd=ROOT, env=environment, **pipes) as process:  # noqa: S603, our own arguments
         try:
@@ -96,30 +94,30 @@ def worker(peer: str, python: str, folder: Path) -> Iterator[Worker]:
             process.terminate()
 
 
-def compare(points: list[int], rounds: int, asked: dict[str, Worker], folder: Path) -> list[Row]:
-    """Check that equal problems get equal answers, then measure round robin in short blocks, so that drift hits all."""
-    differences = {(name, k): _difference(name, k, asked, folder) for k in points for name in asked}
+def compare(points: list[int], rounds: int, workers: dict[str, Worker], folder: Path) -> list[Row]:
+    """Compare the answers to the rows' problem, then measure round robin in short blocks, so that drift affects all."""
+    differences = {(name, k): _difference(name, k, workers, folder) for k in points for name in workers}
     blocks: dict[tuple[str, int], list[list[int]]] = {key: [] for key in differences}
     for turn in range(rounds):
         for k in points:
-            for name in list(asked) if turn % 2 == 0 else list(asked)[::-1]:
+            for name in list(workers) if turn % 2 == 0 else list(workers)[::-1]:
                 block = {"name": name, "points": k, "start": turn * SNAPSHOTS // rounds, "budget_s": BUDGET_S}
-                blocks[name, k].append(asked[name].ask("block", **block))
+                blocks[name, k].append(workers[name].ask("block", **block))
         print(f"round {turn + 1} of {rounds}", file=sys.stderr, end="\r", flush=True)
     return [figures(*key, difference, blocks) for key, difference in differences.items()]
 
 
-def _difference(name: str, points: int, asked: dict[str, Worker], folder: Path) -> float | None:
-    """Largest difference from our answer over all snapshots [rad/s]; None where the problem is another one."""
+def _difference(name: str, points: int, workers: dict[str, Worker], folder: Path) -> float | None:
+    """Return the largest difference from our answer over all snapshots [rad/s]; None for another problem."""
     if not name.endswith("rows"):
         return None
     file = folder / f"{points} {name}.npy"
-    asked[name].ask("answers", name=name, points=points, file=str(file))
+    workers[name].ask("answers", name=name, points=points, file=str(file))
     return float(np.abs(np.load(file) - np.load(folder / f"{points} {REFERENCE}.npy")).max())
 
 
 def figures(name: str, points: int, difference: float | None, blocks: dict[tuple[str, int], list[list[int]]]) -> Row:
-    """Figures of a contender; `ratio` is the median over the rounds of the ratio to our median in the same round."""
+    """Return the row of a contender; `ratio` is the median over the rounds of its median over ours."""
     every = np.concatenate(blocks[name, points]) / 1e3
     medians, ours = ([statistics.median(block) for block in blocks[each, points]] for each in (name, REFERENCE))
     return {
@@ -135,7 +133,7 @@ def figures(name: str, points: int, difference: float | None, blocks: dict[tuple
 
 
 def tables(rows: list[Row], note: str) -> list[TextTable]:
-    """Show times and multiples, a contender a line and a number of points a column."""
+    """Return tables of times and ratios, with a line for each contender and a column for each number of points."""
     points, names = (list(dict.fromkeys(row[key] for row in rows)) for key in ("points", "contender"))
     by_cell = {(row["contender"], row["points"]): row for row in rows}
 
@@ -156,11 +154,11 @@ def _cell(row: Row, keys: tuple[str, ...]) -> str:
 
 
 def main() -> int:
-    """Install if asked to, pose the problem, compare, show; 1 if two answers to the same problem differ."""
+    """Install peers with --set-up, compare them, and print the tables; return 1 if answers to one problem differ."""
     parser = argparse.ArgumentParser(prog="python -m lab.peers", description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--set-up", action="store_true", help="install peers that are missing, under .venv/peers")
+    parser.add_argument("--set-up", action="store_true", help="install missing peers under .venv/peers")
     parser.add_argument("--points", type=int, nargs="+", default=[0, 7, 32, 128, 1000], help="obstacle points K")
-    parser.add_argument("--rounds", type=int, default=20, help="how often every contender has its turn")
+    parser.add_argument("--rounds", type=int, default=20, help="number of blocks of each contender")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to a file")
     args = parser.parse_args()
     for peer in PEERS if args.set_up else ():
@@ -179,10 +177,10 @@ def main() -> int:
     show(Console(), tables(rows, f"{machine}; {SNAPSHOTS} snapshots, {args.rounds} rounds. {about['versions']}"))
     if args.json:
         args.json.write_text(json.dumps({"about": about, "rows": rows}, indent=1) + "\n", encoding="utf-8")
-    off = [row for row in rows if row["difference_rad_s"] is not None and not row["difference_rad_s"] <= TOLERANCE]
-    for row in off:
+    failures = [row for row in rows if row["difference_rad_s"] is not None and not row["difference_rad_s"] <= TOLERANCE]
+    for row in failures:
         print(f"{row['contender']} at {row['points']} points differs by {row['difference_rad_s']:.1e} rad/s.")
-    return int(bool(off))
+    return int(bool(failures))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""All calls into Pretouch: the arm the problem is posed for, and our two contenders."""
+"""All calls into Pretouch: the arm of the problem, and our two contenders."""
 
 from dataclasses import replace
 from importlib.metadata import version
@@ -30,11 +30,11 @@ from pretouch_lab.bench.workload import Workload
 
 VERSIONS = {name: version(name) for name in ("pretouch", "mujoco-core", "numba", "numpy")}
 _SETTLE = 50
-"""Cycles after the force window is full in which the arm gets up to speed."""
+"""Cycles after the force window is full, in which the arm accelerates."""
 
 
 def panda_arm() -> tuple[Arm, Array]:
-    """Read the Panda of Pretouch for everybody else: the arm, and its ready position (n,) [rad]."""
+    """Return the Panda of Pretouch in the format of the problem, and its ready position (n,) [rad]."""
     description = panda()
     model = RobotModel(description)
     mj = mujoco.MjModel.from_xml_path(str(description.mjcf))
@@ -59,7 +59,7 @@ def panda_arm() -> tuple[Arm, Array]:
 
 
 class _Fixed(NamedTuple):
-    """What does not change from snapshot to snapshot."""
+    """Values that are equal in all snapshots."""
 
     hinges: Hinges
     moved_by: BoolArray
@@ -74,7 +74,7 @@ class _Fixed(NamedTuple):
 
 @compiled
 def _solve(q: Array, qd: Array, points: Array, velocity: Array, fixed: _Fixed, kin: Kinematics, x: Array) -> bool:
-    """Write the joint velocities (n,) of a snapshot; return whether there are any."""
+    """Write the joint velocities (n,) of a snapshot; return True if the program was solved."""
     n, near = len(q), no_obstacles(len(points))
     place(fixed.hinges, q, kin)
     near.unit[:], near.point[:], near.direction[:, 2] = fixed.units, points, 1.0
@@ -89,7 +89,7 @@ def _solve(q: Array, qd: Array, points: Array, velocity: Array, fixed: _Fixed, k
 
 
 class Rows:
-    """Kinematics, closest points, rows, joint box and QP, and nothing else: the very problem, in one compiled call."""
+    """Contender that solves the problem in one compiled call: kinematics, closest points, rows, joint box and QP."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem, model, arm = problem, RobotModel(panda()), problem.arm
@@ -117,16 +117,16 @@ class Rows:
         """Joint velocities (n,) [rad/s] of one snapshot."""
         p, x = self.problem, np.empty(len(self.fixed.q_mid))
         if not _solve(p.q[s], p.qd[s], p.points[s], p.velocity[s], self.fixed, self.kin, x):
-            raise RuntimeError(f"The program of snapshot {s} has no answer.")
+            raise RuntimeError(f"The program of snapshot {s} has no solution.")
         return x
 
 
 class Step:
-    """A whole control step of the workload of `pretouch bench cycle` with K units; for K = 0 seven that see nothing.
+    """Contender that runs a whole control step of `pretouch bench cycle` with K units, for K = 0 without readings.
 
     Beside the rows it examines the inputs, locates the points (eq. 1), leaves out views of the arm itself, tracks
-    points and silent units, filters the force, detects contacts, chooses the mode, follows the path and records all of
-    it. Rows are soft. A step is pure, so each is taken again from its state and inputs.
+    points and silent units, filters the force, detects contacts, chooses the mode and follows the path. Rows are soft.
+    A step is a pure function, so it can be repeated from its state and inputs.
     """
 
     def __init__(self, problem: Problem) -> None:

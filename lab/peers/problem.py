@@ -1,16 +1,15 @@
-"""The problem every contender is given: snapshots of a moving arm with obstacle points round it.
+"""The problem of all contenders: snapshots of a moving arm with obstacle points round it.
 
-In each snapshot the joint velocities qd are sought that minimise
+The answer in each snapshot are the joint velocities qd that minimise
 
     1/2 |v - J qd|^2 + mu/2 |qd|^2 + k/2 |(q_mid - q) / t - qd|^2
 
-within the joint box (position, velocity and acceleration limits) and one approach row G qd <= h a point (eqs. 5-7 of
-the paper). The snapshots lie on a smooth motion. Points are drawn round the arm and kept if the motion itself, with a
-margin, is allowed by their row: every problem is feasible by construction, and thinly so, because half of the points
-are those with the smallest margins.
+within the joint box (position, velocity and acceleration limits) and one approach row G qd <= h a point (eqs. 5-7 of the
+paper). The snapshots are on a smooth motion. Random points round the arm are used if their row allows the motion
+itself with a margin, so every problem is feasible. Half of the points have the smallest margins, so it is barely so.
 
-All is plain NumPy, vectorised over points, as a user of a peer would write it. Nothing of Pretouch is imported here, so
-an agreement with it means something.
+The code is plain NumPy, vectorised over points, as a user of a peer would write it. It imports nothing of Pretouch, so
+its answers are an independent check.
 """
 
 from dataclasses import asdict, dataclass
@@ -23,19 +22,19 @@ Array = Any
 """A NumPy array of float64, or of integers where so documented."""
 
 PERIOD_S = 0.01
-"""Time a joint velocity is held."""
+"""Time for which a joint velocity is constant [s]."""
 MID_JOINT_GAIN, MID_JOINT_TIME_S = 0.001, 5.0
 DAMPING_MAX, MANIPULABILITY = 0.01, 0.2
-"""The threshold is high, so that the damping is at work in most snapshots."""
+"""Damping and its threshold, high enough for damping in most snapshots."""
 V_MAX_M_S, BETA = 0.04, -10.0
 D_REPULSE_M, D_CRIT_M, D_NOTICE_M = 0.1, 0.1, 0.6
-"""Of the approach rows, as all of these the values of Table I where the paper has one."""
+"""Parameters of the approach rows; they and those above are the values of Table I where the paper has one."""
 MARGIN = 1e-4
-"""By how much the motion keeps below each row's limit at least [m/s]."""
+"""Least margin of the motion to each row's limit [m/s]."""
 _SPACING_S = 0.05
-"""Time between two snapshots."""
+"""Time between two snapshots [s]."""
 _SPEED = 0.2
-"""Task velocity asked for beside that of the motion [m/s]."""
+"""Task velocity in addition to that of the motion [m/s]."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +125,7 @@ def joint_box(arm: Arm, q: Array, qd: Array) -> tuple[Array, Array]:
 
 
 def _viable(distance: Array, a: Array) -> Array:
-    """Largest speed from which whole periods of braking still end before the limit."""
+    """Largest speed from which braking in whole periods ends before the limit."""
     d = np.maximum(distance, 0.0)
     steps = np.floor((np.sqrt(1.0 + 8.0 * d / (a * PERIOD_S**2)) - 1.0) / 2.0)
     return (d / PERIOD_S + a * PERIOD_S * steps * (steps + 1.0) / 2.0) / (steps + 1.0)
@@ -142,9 +141,9 @@ class Problem:
     qd: Array
     """(S, n) last commanded joint velocities [rad/s]."""
     witness: Array
-    """(S, n) joint velocities that are allowed: those of the motion one period later [rad/s]."""
+    """(S, n) feasible joint velocities: those of the motion one period later [rad/s]."""
     velocity: Array
-    """(S, 3) velocity asked of the TCP [m/s]."""
+    """(S, 3) desired velocity of the TCP [m/s]."""
     points: Array
     """(S, K, 3) obstacle points, base frame [m]."""
 
@@ -183,7 +182,7 @@ def generate(arm: Arm, q_ready: Array, snapshots: int, points: int, seed: int) -
 
 
 def _cloud(arm: Arm, rotation: Array, origin: Array, witness: Array, points: int, rng: np.random.Generator) -> Array:
-    """K points (K, 3) whose rows the witness keeps: half of them with the smallest margins, the others as drawn."""
+    """Return K points (K, 3) whose rows allow the motion: half with the smallest margins, half at random."""
     allowed, margins = np.empty((0, 3)), np.empty(0)
     while len(allowed) < 2 * points:
         drawn = _round_the_arm(arm, rotation, origin, 4 * points, rng)

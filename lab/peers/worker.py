@@ -1,4 +1,4 @@
-"""One environment's contenders, in a process of its own: solves what its standard input asks for.
+"""Contenders of one environment in a process of its own, which answers requests on its standard input.
 
     python -m lab.peers.worker MODULE FOLDER
 
@@ -20,18 +20,18 @@ import numpy as np
 from lab.peers.problem import load
 
 _WARM = 5
-"""Solves before each block that are not counted: the process has slept, its caches are cold."""
+"""Uncounted solutions before each block: the process has slept, and its caches are cold."""
 
 
 class Contenders:
-    """The contenders of a module, made when they are first asked for."""
+    """Contenders of a module, built at the first request."""
 
     def __init__(self, module: str, folder: Path) -> None:
         self.module, self.folder = importlib.import_module(f"lab.peers.{module}_peer"), folder
         self.contender = cache(lambda name, points: self.module.CONTENDERS[name](load(folder / f"{points}.npz")))
 
     def about(self) -> dict[str, Any]:
-        """Versions and contenders."""
+        """Return versions and contenders."""
         return {"versions": self.module.VERSIONS, "contenders": list(self.module.CONTENDERS)}
 
     def answers(self, name: str, points: int, file: str) -> None:
@@ -40,7 +40,7 @@ class Contenders:
         np.save(file, np.array([contender.solve(s) for s in range(len(contender.problem.q))]))
 
     def block(self, name: str, points: int, start: int, budget_s: float) -> list[int]:
-        """CPU times [ns] of the snapshots from `start` on, at most each once, ended by the budget but never none."""
+        """Return CPU times [ns] of at least one snapshot from `start` on, each at most once, within the budget."""
         contender = self.contender(name, points)
         total, spent, begin = len(contender.problem.q), list[int](), time.process_time()
         for s in range(start, start + _WARM):

@@ -1,4 +1,4 @@
-"""Prints what the house is like beside what is aimed at, and fails where it is beyond its bounds.
+"""Prints measures of the repository beside their aims, and fails if one exceeds its bound.
 
 A bound is what has been reached, in `bounds.toml`, and is only ever lowered: a test compares it with the commit before.
 What does not fit waits until something else has gone.
@@ -47,7 +47,7 @@ _RIM = frozenset(
 
 @dataclass(frozen=True)
 class Measure:
-    """A number of the house, and what is aimed at."""
+    """A measure of the repository with its aim."""
 
     name: str
     value: int
@@ -56,7 +56,7 @@ class Measure:
 
 
 def measures() -> Iterator[Measure]:
-    """Measure the house."""
+    """Yield all measures of the repository."""
     packages = {name: _source(folder) for name, folder in _PACKAGES.items()}
     product, core = packages["pretouch"], _core(_PACKAGES["pretouch"])
     yield Measure("pretouch: lines", product.lines, 36_000)
@@ -94,7 +94,7 @@ def bounds(text: str) -> dict[str, int]:
 
 
 def main() -> int:
-    """Print the measures; return 1 where one is beyond its bound, or has none."""
+    """Print the measures; return 1 if one exceeds its bound or has none."""
     limits, beyond = bounds(BOUNDS.read_text()), []
     print(f"{'':32}{'now':>8}{'bound':>8}{'aim':>8}")
     for measure in measures():

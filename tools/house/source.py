@@ -26,7 +26,7 @@ PARTICIPLES = frozenset(
         "held",
     }
 )
-"""Names of variables that say what was done to a value and not what it is."""
+"""Names of variables that describe what was done to a value, instead of the value."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Source:
 
     @property
     def format_skips(self) -> int:
-        """Number of places that are kept from the formatter."""
+        """Number of places that the formatter leaves out."""
         return sum(text.count("# fmt: skip") for text in self._text.values())
 
     @property

@@ -1,4 +1,4 @@
-"""Finds names and docstrings that a reader of the field stumbles over: `make lint` fails where there is one.
+"""Finds names and docstrings that a reader of the field has to read twice: `make lint` fails if there is one.
 
 A variable, parameter or field is named by a noun of the field, not by a participle. A docstring names its thing first:
 "Distance to the nearest obstacle", not "What is near".
@@ -15,9 +15,9 @@ ROOT = Path(__file__).parents[2]
 _FOLDERS = ("src", "fci/src", "ros2/src", "lab/src", "tools")
 
 NAMES = PARTICIPLES | {"gone", "heard", "judged", "meant", "met", "seen"}
-"""Participles that say what was done to a value and not what the value is."""
+"""Participles that describe what was done to a value, instead of the value."""
 BEGINNINGS = frozenset({"Of", "What", "Whether", "Whom"})
-"""First words of docstrings whose sentence has its noun late or nowhere."""
+"""First words of docstrings whose sentence has its noun late or lacks one."""
 
 STORED = frozenset(
     {
@@ -31,7 +31,7 @@ STORED = frozenset(
 
 
 def hard_words(tree: ast.AST, allowed: frozenset[str] = frozenset()) -> Iterator[tuple[int, str]]:
-    """Yield line and sentence of each name, but for those allowed, and of each docstring to be written anew."""
+    """Yield line and sentence of each name, except allowed ones, and of each docstring to rewrite."""
     for node in ast.walk(tree):
         match node:
             case ast.Name(id=name, ctx=ast.Store()) | ast.arg(arg=name) | ast.Attribute(attr=name, ctx=ast.Store()):

@@ -1,1 +1,1 @@
-"""The documentation site: pages by hand, pages that the code writes, and links that hold in both."""
+"""The documentation site: pages written by hand, generated pages, and links that work on both."""

@@ -19,11 +19,11 @@ _BESIDE = {
     "CHANGELOG.md": "changelog.md",
     "fci/README.md": "pretouch-fci.md",
 }
-"""Documents outside `docs`, and the pages that they become."""
+"""Documents outside `docs`, and their pages."""
 
 
 def write_pages(pages: Path) -> None:
-    """Lay out all pages, and what they show, below a folder, which is made anew."""
+    """Write all pages and their images below a new folder."""
     shutil.rmtree(pages, ignore_errors=True)
     shutil.copytree(ROOT / "docs", pages)
     (pages / "assets").mkdir()

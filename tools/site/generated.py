@@ -1,4 +1,4 @@
-"""Pages that the code writes: public names, commands and parameters, as they are at the time of the build."""
+"""Pages generated from the code at build time: public names, commands and parameters."""
 
 import io
 import pkgutil
@@ -23,7 +23,7 @@ API = {
     "simulation": ("Simulation", ("sim",)),
     "values": ("Values and errors", ("types", "desired", "limited", "errors")),
 }
-"""Pages of public names: title and the modules whose names stand there."""
+"""Pages of public names: title, and modules of the names."""
 PAGES = {
     **{f"reference/python-{page}.md": f"Python: {title}" for page, (title, _) in API.items()},
     "reference/commands.md": "Commands",
@@ -33,7 +33,7 @@ PAGES = {
 
 
 def public_names(packages: tuple[str, ...]) -> list[str]:
-    """Return the public names of some modules of the product, and below them, each by where it is defined."""
+    """Return the public names of some modules of the product and of modules below them, by the place of definition."""
     places = (f"{place}.{name}" for name, place in pretouch._PLACE.items())
     return sorted(place for place in places if place.split(".")[1] in packages)
 
@@ -45,7 +45,7 @@ def api_page(title: str, packages: tuple[str, ...]) -> str:
 
 
 def _help(words: list[str]) -> str:
-    """Return what a command's `--help` prints, 80 columns wide."""
+    """Return the output of a command's `--help`, 80 columns wide."""
     text = io.StringIO()
     with patch.dict("os.environ", {"COLUMNS": "80", "NO_COLOR": "1"}), redirect_stdout(text):
         try:
@@ -73,7 +73,7 @@ def commands_page() -> str:
 
 
 def parameter_sets() -> list[type]:
-    """Return all sets of parameters of the product but those that another one extends."""
+    """Return all classes of parameters of the product, except base classes of others."""
     for module in pkgutil.walk_packages(pretouch.__path__, "pretouch."):
         if module.name.endswith("__main__"):
             continue

@@ -1,4 +1,4 @@
-"""Links that lead to files of the repository lead to pages of the site."""
+"""Replaces links to files of the repository by links to pages of the site."""
 
 import os
 import re
@@ -15,10 +15,10 @@ class Layout:
         self.root, self.pages = root, pages
         self._beside = beside
         self.sources: dict[Path, Path] = {}
-        """Files and folders that are linked to and are no documents, and the page that shows each."""
+        """Linked files and folders that are no documents, with the page of each."""
 
     def page_of(self, file: Path) -> Path:
-        """Return the page of a file or folder of the repository; what is no document gets one that shows it."""
+        """Return the page of a file or folder of the repository, a new page if it is no document."""
         name = str(file.relative_to(self.root))
         if name in self._beside:
             return self.pages / self._beside[name]
@@ -32,7 +32,7 @@ class Layout:
         return [*sorted((self.root / "docs").rglob("*.md")), *(self.root / name for name in self._beside)]
 
     def rebased(self, document: Path) -> str:
-        """Return a document's text with links to where things stand on the site."""
+        """Return a document's text with the links of the site."""
         page = self.page_of(document)
 
         def moved(link: re.Match[str]) -> str:
@@ -44,7 +44,7 @@ class Layout:
 
 
 def source_page(file: Path, root: Path) -> str:
-    """Return a page that shows a file, or the files of a folder, as they are."""
+    """Return a page with the text of a file, or of the files in a folder."""
     files = [file] if file.is_file() else sorted(path for path in file.iterdir() if path.is_file())
     kinds = {".py": "python", ".toml": "toml"}
     sections = [
