@@ -37,9 +37,9 @@ def announcing(kind, said):
 def steps_of(context):
     """Steps of an arm that grips so much, announced so much earlier and 5 % wrong, is pushed, and puts it down."""
 
-    def played(seed: int, kg: float, early: float | None, end: float = 30.5, push: float = 0.0) -> list[ControlStep]:
+    def played(seed: int, kg: float, early: float, end: float = 30.5, push: float = 0.0) -> list[ControlStep]:
         def said(time: float) -> Payload | None:
-            if early is None or time < GRIPPED - early:
+            if time < GRIPPED - early:
                 return None
             return Payload(kg * (1.0 + 0.05 * (-1) ** seed) if time < PUT_DOWN - early else 0.0)
 
@@ -63,20 +63,15 @@ def alarms(steps: list[ControlStep]) -> list[float]:
     return [step.stamp for step in steps if step.contact is not None]
 
 
-@pytest.mark.parametrize(
-    ("seed", "kg", "early"), [(100, 0.7, 0.0), (101, 0.7, 0.0), (100, 0.7, 0.25), (101, 0.7, 0.25), (103, 3.0, 0.1)]
-)
+@pytest.mark.parametrize(("seed", "kg", "early"), [(100, 0.7, 0.0), (101, 0.7, 0.25), (103, 3.0, 0.1)])
 def test_a_load_that_was_announced_gives_no_alarm(steps_of, seed, kg, early):
     assert not alarms(steps_of(seed, kg, early))
-
-
-def test_one_that_was_not_gives_one(steps_of):
-    assert GRIPPED < alarms(steps_of(100, 0.7, None, 26.0))[0] < GRIPPED + 0.2
 
 
 def test_announced_too_late_it_gives_one_and_the_arm_goes_on_soon(steps_of):
     steps = steps_of(100, 0.7, -0.25, PUT_DOWN)
     (at,) = alarms(steps)
+    assert GRIPPED < at < GRIPPED + 0.2  # so it was not announced at all
     assert next(step.stamp for step in steps if step.stamp > at and step.mode is Mode.TRACK) - at < 3.0
 
 

@@ -17,14 +17,11 @@ def part_of(rows, measure, reference="blind", baseline="pretouch"):
     return found["part"], found["trials"]
 
 
-def test_a_force_is_held_against_the_references_in_the_same_trial_and_is_none_without_contact():
+def test_a_force_is_held_against_the_references_in_the_same_trial_if_that_touched_and_is_none_without_contact():
     rows = [trial("blind", s, contact=True, true_peak_20ms_n=100.0) for s in range(3)]
     rows += [trial("pretouch", 0, contact=True, true_peak_20ms_n=10.0), trial("pretouch", 1, true_peak_20ms_n=0.0)]
     rows += [trial("pretouch", 2, contact=True, true_peak_20ms_n=50.0)]
     assert part_of(rows, "true_peak_20ms_n") == (0.1, 3)
-
-
-def test_a_trial_the_reference_did_not_touch_in_says_nothing_of_forces():
     rows = [trial("blind", 0, true_peak_20ms_n=0.0), trial("pretouch", 0, contact=True, true_peak_20ms_n=10.0)]
     assert paired(rows) == []
 
@@ -72,15 +69,12 @@ def measured(**changes):
     return detection, {"about": {"bench": "avoidance", **told}, "rows": played, "paired": pairs, "families": families}
 
 
-def test_goals_that_are_just_reached_are_reached():
+def test_goals_that_are_just_reached_are_reached_and_a_missed_one_says_so_with_its_number():
     assert [reached for _, reached, *_ in goals(*measured())] == [True] * 14
     table = goal_table(*measured())
     assert table.rows[0][1:] == ("reached", "0.4/h (2 in 5 h)", "0.05 to 1.4/h")
     assert table.rows[9][2:] == ("5 times (32 trials)", "4.55 to 10 times")
     assert table.rows[12][2:] == ("30 % (32 trials); 6.0 N and 6.0 N", "23 to 65 %")
-
-
-def test_a_goal_that_is_missed_says_so_with_its_number():
     late = goal_table(*measured(of=("paper-off", "first_contact_s"), part=None))
     assert late.rows[11][1:] == ("not reached", "0 times (32 trials)", "1.82 to 4 times")
     assert goal_table(*measured(towards_person=1)).rows[8][1] == "not reached"

@@ -73,15 +73,8 @@ def test_a_hard_arm_moves_and_sees_without_a_controller_as_with_one(monkeypatch)
 
 def test_rows_are_by_motion_and_loads_that_nobody_announced_are_apart():
     def free(motion, near, alarms):
-        named = {
-            "family": "hard",
-            "contender": "pretouch",
-            "path": motion,
-            "near": near,
-            "kind": "nominal",
-            "speed_m_s": 0.0,
-        }
-        return named | {"hours": 1.0, "alarms": alarms}
+        arm = {"family": "hard", "path": motion, "near": near, "kind": "nominal", "speed_m_s": 0.0}
+        return arm | {"contender": "pretouch", "hours": 1.0, "alarms": alarms}
 
     touch = {"seen": True, "delay_s": 0.03, "towards": False, "detectable": True, "force_n": 20.0, "duration_s": 0.3}
     touch |= {"link": "hand"}

@@ -40,14 +40,13 @@ def errors(model, skin, error, seed):
     return 1000 * (believed - sit)[:, :3, 3], turns.as_rotvec(degrees=True)
 
 
-@pytest.mark.parametrize(("position", "angle"), [(0.0, 0.0), (50.0, 0.0), (0.0, 20.0), (3.0, 0.5)])
-def test_each_unit_is_off_by_exactly_the_error(panda_model, paper_skin, position, angle):
-    shifts, turns = errors(panda_model, paper_skin, Misplacement(position, angle), seed=3)
-    assert np.linalg.norm(shifts, axis=1) == pytest.approx(np.full(len(paper_skin), position), abs=1e-6)
-    assert np.linalg.norm(turns, axis=1) == pytest.approx(np.full(len(paper_skin), angle))
-
-
-def test_the_same_seed_gives_the_same_direction_at_every_size(panda_model, paper_skin):
+def test_each_unit_is_off_by_exactly_the_error_and_a_seed_gives_the_same_direction_at_every_size(
+    panda_model, paper_skin
+):
+    for position, angle in ((0.0, 0.0), (50.0, 0.0), (0.0, 20.0), (3.0, 0.5)):
+        shifts, turns = errors(panda_model, paper_skin, Misplacement(position, angle), seed=3)
+        assert np.linalg.norm(shifts, axis=1) == pytest.approx(np.full(len(paper_skin), position), abs=1e-6)
+        assert np.linalg.norm(turns, axis=1) == pytest.approx(np.full(len(paper_skin), angle))
     (shifts, turns), large, (others, _) = (
         errors(panda_model, paper_skin, Misplacement(size, size), seed) for size, seed in ((0.5, 2), (1.0, 2), (0.5, 4))
     )
@@ -116,14 +115,11 @@ def test_an_arm_that_believes_the_truth_does_as_if_it_were_told_nothing(context)
     assert commands[0] == commands[1]
 
 
-def test_units_in_their_place_find_the_board(context):
+def test_units_in_their_place_find_the_board_and_run_free_in_an_empty_room(context, monkeypatch):
     row, _ = mounting.trial(cell(), 1, context)
     assert row["contact"]
     assert row["detection_delay_s"] > 0
     assert (row["false_detections"], row["travelled_m"]) == (0, None)
-
-
-def test_in_an_empty_room_an_arm_with_units_in_their_place_runs_free(context, monkeypatch):
     monkeypatch.setattr(mounting, "_ROOM_S", 5.0)
     row, _ = mounting.trial(cell(ROOM), 0, context)
     assert (row["contact"], row["false_detections"]) == (False, 0)

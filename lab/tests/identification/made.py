@@ -1,6 +1,7 @@
 """Free motion of an arm made by equations of motion, without the simulator: sines, an observer, and known errors."""
 
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 
@@ -62,6 +63,12 @@ def free_motion(made: Made = Made(), seconds: float = 60.0, seed: int = 5, every
         if i % every == every - 1:
             rows.append((t[i, 0], q[i], measured[i], state.residual))
     return ArmSamples(*(np.array(column) for column in zip(*rows, strict=True)))
+
+
+@cache
+def usual_motion() -> ArmSamples:
+    """Return 60 s of the usual errors at 1 kHz, which take seconds, once for all tests."""
+    return free_motion(Made(), every=1)
 
 
 def row(found: IdentifiedArm, field: str) -> Quantity:

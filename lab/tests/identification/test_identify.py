@@ -3,7 +3,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lab.tests.identification.made import FRICTION, MODEL, PLANT, USUAL, Made, free_motion, row, sigmas_off
+from lab.tests.identification.made import (
+    FRICTION,
+    MODEL,
+    PLANT,
+    USUAL,
+    Made,
+    free_motion,
+    row,
+    sigmas_off,
+    usual_motion,
+)
 
 from pretouch.errors import CalibrationError
 from pretouch.sim.randomisation import drawn, world_set
@@ -16,7 +26,7 @@ MADE = Made()
 
 @pytest.fixture(scope="module")
 def samples():
-    return free_motion(MADE)
+    return usual_motion().at(np.arange(9, 60_000, 10))
 
 
 @pytest.fixture(scope="module")
@@ -82,6 +92,11 @@ def test_samples_that_are_no_numbers_and_gaps_are_left_out_and_said(samples):
     assert found.fit.numbers[-2] == pytest.approx(MADE.payload, abs=0.1)
 
 
+def pushed(samples):
+    """Return samples of an arm that somebody pushes for seconds, again and again."""
+    return replace(samples, tau=samples.tau + 15.0 * (np.sin(np.arange(len(samples.stamp)) / 300.0) > 0.3)[:, None])
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -90,10 +105,7 @@ def test_samples_that_are_no_numbers_and_gaps_are_left_out_and_said(samples):
         (lambda s: replace(s, tau=s.tau * np.nan), "no two samples with numbers"),
         (lambda s: replace(s, stamp=10.0 * s.stamp), "The samples come at 10 Hz"),
         (lambda s: replace(s, q=s.q[:, :6]), "has 6 joints and 7 torques"),
-        (
-            lambda s: replace(s, tau=s.tau + 15.0 * (np.sin(np.arange(len(s.stamp)) / 300.0) > 0.3)[:, None]),
-            "looks like contacts",
-        ),
+        pytest.param(pushed, "looks like contacts", marks=pytest.mark.slow),
     ],
 )
 def test_a_recording_that_cannot_tell_is_refused_with_what_is_missing(samples, change, said):

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lab.tests.identification.made import FRICTION, MODEL, USUAL, Made, free_motion, row, sigmas_off
+from lab.tests.identification.made import FRICTION, MODEL, USUAL, Made, row, sigmas_off, usual_motion
 
 from pretouch.errors import CalibrationError
 from pretouch_lab.identification.arm_file import arm_toml
@@ -18,7 +18,7 @@ MADE = Made()
 
 @pytest.fixture(scope="module")
 def fast():
-    return free_motion(MADE, every=1)
+    return usual_motion()
 
 
 def every(count):
