@@ -11,7 +11,7 @@ from pretouch.sim.randomisation import drawn, world_set
 
 @pytest.fixture(scope="module")
 def table(tmp_path_factory):
-    samples = usual_motion().at(np.arange(9, 40_000, 10))
+    samples = usual_motion().at(np.arange(9, 30_000, 10))
     kinds = {"q{}_rad": samples.q, "qd{}_rad_s": samples.qd, "tau_ext{}_Nm": samples.tau}
     columns = {name.format(j + 1): values[:, j] for name, values in kinds.items() for j in range(7)}
     place = tmp_path_factory.mktemp("free") / "free.csv"

@@ -115,9 +115,10 @@ def test_a_recording_that_cannot_tell_is_refused_with_what_is_missing(samples, c
 
 @pytest.mark.slow
 def test_torques_with_gravity_in_them_are_of_another_arm(samples):
-    gravity = np.array([MODEL.mass_matrix_and_bias(q, np.zeros(7), np.zeros(7))[1] for q in samples.q])
+    some = samples.at(np.arange(2500))
+    gravity = np.array([MODEL.mass_matrix_and_bias(q, np.zeros(7), np.zeros(7))[1] for q in some.q])
     with pytest.raises(CalibrationError, match="another arm than panda"):
-        identify(replace(samples, tau=samples.tau + gravity), MODEL, USUAL)
+        identify(replace(some, tau=some.tau + gravity), MODEL, USUAL)
 
 
 def test_the_derivatives_of_friction_are_those_of_differences():
