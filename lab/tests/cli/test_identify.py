@@ -1,8 +1,7 @@
 import json
 
-import numpy as np
 import pytest
-from lab.tests.identification.made import usual_motion
+from lab.tests.identification.made import Made, free_motion
 from tests.imported_data.files import write_csv
 
 from pretouch import cli
@@ -11,7 +10,7 @@ from pretouch.sim.randomisation import drawn, world_set
 
 @pytest.fixture(scope="module")
 def table(tmp_path_factory):
-    samples = usual_motion().at(np.arange(9, 30_000, 10))
+    samples = free_motion(Made(), seconds=40.0)
     kinds = {"q{}_rad": samples.q, "qd{}_rad_s": samples.qd, "tau_ext{}_Nm": samples.tau}
     columns = {name.format(j + 1): values[:, j] for name, values in kinds.items() for j in range(7)}
     place = tmp_path_factory.mktemp("free") / "free.csv"

@@ -11,12 +11,11 @@ from tests.other_arm import copied_panda
 from pretouch.errors import ExperimentError
 from pretouch.importing.robot_import import ImportOptions, import_robot, write_folder
 from pretouch.profiles import profile
-from pretouch.robot.description import RobotDescription, panda, robot_named
+from pretouch.robot.description import RobotDescription, robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import brought_to
 from pretouch.sim.hand import PALM, robot_hand
 from pretouch.sim.paper_scenes import placement_for
-from pretouch.sim.plant_params import assumed_plant
 from pretouch_lab.bench.avoidance import trial
 from pretouch_lab.bench.avoidance_scenes import scenarios, setting
 from pretouch_lab.experiment import Context, context_of
@@ -99,12 +98,6 @@ def test_an_arm_that_cannot_follow_the_paths_is_refused_with_the_reason(stranger
         placement_for(RobotModel(replace(stranger, **changed)))
     assert reason in str(said.value)
     assert "Give another q_ready in robot.toml" in str(said.value)
-
-
-def test_what_is_assumed_of_the_joints_is_said(stranger):
-    assert assumed_plant(panda()) == "The joints of the simulated panda are those of a Panda."
-    weaker = replace(stranger, tau_max=stranger.tau_max / 2)
-    assert "scaled by torque limits" in assumed_plant(weaker)
 
 
 @pytest.mark.slow

@@ -2,7 +2,6 @@ import json
 
 import numpy as np
 import pytest
-from lab.tests.width import width
 from tests.limits import assert_within_limits
 
 from pretouch_lab.experiments import between
@@ -71,7 +70,6 @@ def test_summary_and_table_count_what_the_rows_say(trials):
     assert [row[0] for row in table.rows] == ["blind\noff", "paper\nslack"]
     assert table.rows[0][1:3] == ("0/1", "0/1")
     assert table.rows[1][1:5] == ("2/2", "2/2", "1/2", f"{1000 * rows[1]['detection_delay_s']:.0f}")
-    assert width(table) <= 80
 
 
 def test_a_trace_has_what_each_unit_showed_and_the_close_up_the_touch_and_both_bounds(trials, paper_skin):

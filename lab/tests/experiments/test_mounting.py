@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lab.tests.width import width
 from scipy.spatial.transform import Rotation
 
 from pretouch.recording.reader import open_recording
@@ -145,5 +144,4 @@ def test_trials_are_compared_with_their_twin_without_error():
     assert [r[8] for r in forces.rows] == ["1.00", "1.50", "2.00"], "the trial at -y has no twin"
     assert forces.rows[1][-1] == "2"
     assert room.rows[1][3:] == ("80", "1")
-    assert max(width(table) for table in (forces, room)) <= 80
     assert tables([]) == []

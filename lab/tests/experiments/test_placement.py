@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 from tests.other_arm import copied_panda
 from tests.recording.runs import custom_arm
@@ -16,6 +18,7 @@ from pretouch.sim.paper_scenes import (
     static_path,
     static_scene,
 )
+from pretouch.sim.plant_params import assumed_plant
 
 
 def test_the_panda_has_the_papers_paths_and_the_side_of_its_hand_is_about_what_the_board_takes_it_for(panda_model):
@@ -40,7 +43,10 @@ def test_of_a_simulated_arm_it_is_said_what_is_assumed(panda_model, tmp_path):
     paths, plant = assumptions(other, Placement(0.8))
     assert paths.startswith("The paper's paths for panda: 0.8 times as large and as far from the base")
     assert "hand" not in paths
-    assert assumptions(other, Placement()) == (plant,)
+    assert assumptions(other, Placement()) == (plant,) == (assumed_plant(other.description),)
+    assert "those of a Panda" in plant
+    weaker = replace(other.description, tau_max=other.description.tau_max / 2)
+    assert "scaled by torque limits" in assumed_plant(weaker)
 
 
 def test_another_arm_has_them_scaled_and_the_board_stands_where_its_hand_meets_it():
