@@ -1,9 +1,9 @@
-"""The contact detector alone, on any force signal: thresholds that move with its statistics, and with what is near.
+"""The contact detector alone, on any force signal: thresholds that follow its statistics and the obstacles near.
 
     python examples/01_contact_detector.py
 
-It takes a force per sample and, if you know of objects near, where they are. Near an object a light touch counts: the
-push here is not detected with nothing near, and is detected from a hand on that side.
+Its inputs are a force per sample and the positions of objects near, if any. Thresholds are lower towards an object: the
+push here is not detected with nothing near, and is detected with a hand on that side.
 """
 
 import numpy as np
@@ -20,13 +20,13 @@ posture, unit, aside = arm.kinematics(arm.description.q_ready), np.array([0]), n
 hand = pt.closest_points(posture, arm.body, ee, unit, point=ee + 0.2 * aside, last_direction=aside)
 
 for name, near in {"nothing near": pt.no_obstacles(), "a hand 0.2 m away at +y": hand}.items():
-    detector, params, said = pt.MovingThresholds(), pt.WindowParams(), "no contact"
+    detector, params, result = pt.MovingThresholds(), pt.WindowParams(), "no contact"
     window = pt.window_init(params.samples)
     for i, sample in enumerate(force):
         armed, window = window.full, pt.add_force(window, sample, params)
-        found = detector.judge(window, sample, armed, ee, near)
-        if found.contact is not None:
-            crossed = f"{window.newest[1]:.1f} N in y, filtered, is beyond {found.thresholds.lower[1]:.1f} N"
-            said = f"contact {i - 300} samples after the push began: {crossed}"
+        detection = detector.judge(window, sample, armed, ee, near)
+        if detection.contact is not None:
+            crossed = f"{window.newest[1]:.1f} N in y, filtered, is beyond {detection.thresholds.lower[1]:.1f} N"
+            result = f"contact {i - 300} samples after the push began: {crossed}"
             break
-    print(f"{name}: {said}")
+    print(f"{name}: {result}")

@@ -2,7 +2,7 @@
 
     python examples/02_rows_for_your_own_qp.py
 
-Here the program is solved by SciPy; the rows and the joint box are plain arrays for any solver.
+SciPy solves the program here; the rows and the joint box are plain arrays for any solver.
 """
 
 import numpy as np
@@ -21,8 +21,8 @@ near = pt.closest_points(kin, arm.body, ee, np.arange(2), points, np.tile([1.0, 
 rows = pt.approach_rows(kin, arm.moved_by, near, pt.row_numbers(pt.ApproachRestriction(rows="hard")))
 lower, upper, _ = pt.joint_box(q, qd, pt.joint_limits(arm, margin=0.01, period=0.01).table)
 
-wanted = np.array([0.1, 0.0, 0.0])  # towards the nearer point [m/s]
-H, f = J.T @ J + 1e-3 * np.eye(7), -J.T @ wanted
+velocity = np.array([0.1, 0.0, 0.0])  # desired, towards the nearer point [m/s]
+H, f = J.T @ J + 1e-3 * np.eye(7), -J.T @ velocity
 for name, limits in (("free", []), ("restricted", [LinearConstraint(rows.G, ub=rows.h)])):
     program = {"bounds": Bounds(lower, upper), "constraints": limits, "options": {"ftol": 1e-12}}
     x = minimize(lambda x: 0.5 * x @ H @ x + f @ x, qd, jac=lambda x: H @ x + f, method="SLSQP", **program).x

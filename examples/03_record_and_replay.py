@@ -1,4 +1,4 @@
-"""A control loop that is recorded, and the recording recomputed. Prints what was recorded and whether it is the same.
+"""Record a control loop, and recompute the recording. Prints what was recorded, and a comparison.
 
 python examples/03_record_and_replay.py
 """
@@ -19,7 +19,7 @@ with TemporaryDirectory() as folder:
     place = Path(folder) / "run.mcap"
     q, qd = arm.description.q_ready, still
     state = control.init(pt.RobotState(0.0, q, qd, q, qd, still, quiet))
-    with pt.Recording(place, control, {"what": "an arm that does exactly what it is told"}) as recording:
+    with pt.Recording(place, control, {"what": "an arm that follows its commands exactly"}) as recording:
         for now in np.arange(1, 301) * control.limits.period:
             robot = pt.RobotState(now, q, qd, q, qd, still, quiet)
             inputs = pt.Inputs(now, robot, pt.RangeReadings(np.full(7, now), np.zeros(7), nothing))
@@ -30,5 +30,5 @@ with TemporaryDirectory() as folder:
     print(recording.close())
 
     recorded = pt.open_recording(place)
-    speed = max(float(np.linalg.norm(kept.step.ee_velocity)) for kept in recorded)
+    speed = max(float(np.linalg.norm(cycle.step.ee_velocity)) for cycle in recorded)
     print(f"Fastest: {speed:.2f} m/s. {pt.verify(recorded).sentence}")

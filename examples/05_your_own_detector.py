@@ -1,9 +1,9 @@
-"""A contact detector of your own, in a profile: a cumulative sum of what the force has beyond its usual spread.
+"""A contact detector of your own in a profile: a cumulative sum of the force beyond its usual spread.
 
     python examples/05_your_own_detector.py
 
-To choose it by name in any command, as `--profile paper:detect=cusum`, name the class in an entry point of the group
-`pretouch.detectors`.
+An entry point of the group `pretouch.detectors` makes the class available in every command, by `--profile
+paper:detect=cusum`.
 """
 
 from dataclasses import dataclass, replace
@@ -15,13 +15,13 @@ import pretouch as pt
 
 @dataclass(frozen=True)
 class Cusum(pt.Detector, name="cusum"):
-    """Page's test on the norm of the force: it adds up what is beyond `drift_n` of the window's mean."""
+    """Page's test on the norm of the force: it sums the deviations from the window's mean beyond `drift_n`."""
 
     by_torques = False  # the force is enough
     drift_n: float = 3.0
-    """Force that is expected in free motion [N]."""
+    """Largest usual deviation in free motion [N]."""
     limit_n: float = 20.0
-    """Sum that makes a contact [N]."""
+    """Least sum of a contact [N]."""
 
     def init(self, body, learnt=None):
         return 0.0
@@ -39,7 +39,7 @@ class Cusum(pt.Detector, name="cusum"):
 arm = pt.RobotModel(pt.panda())
 profile = replace(pt.profile("blind"), name="blind with a cumulative sum", detect=Cusum())
 control = pt.Controller(arm, pt.Skin((), arm), pt.no_fixtures(), pt.segment((0.3, 0.0, 0.5), (0.3, 0.2, 0.5)), profile)
-rng, q, rest, state, said = np.random.default_rng(0), arm.description.q_ready, np.zeros(7), None, ""
+rng, q, rest, state, reason = np.random.default_rng(0), arm.description.q_ready, np.zeros(7), None, ""
 for i in range(300):
     push = np.array([0.0, -8.0, 0.0]) if i >= 200 else np.zeros(3)
     wrench = np.concatenate([rng.normal(0.0, 0.5, 3) + push, np.zeros(3)])
@@ -47,6 +47,6 @@ for i in range(300):
     state = control.init(robot) if state is None else state
     none = pt.RangeReadings(np.zeros(0), np.zeros(0), np.zeros(0, np.int64))
     step, state = control.step(state, pt.Inputs(0.01 * i, robot, none))
-    if step.reason.split("(")[0] != said:
-        said = step.reason.split("(")[0]
+    if step.reason.split("(")[0] != reason:
+        reason = step.reason.split("(")[0]
         print(f"{step.stamp:5.2f} s  {step.mode.value:5}  {step.reason}")

@@ -1,10 +1,9 @@
-"""A restriction of your own: speed and separation, as a class and an entry in a profile.
+"""A restriction of your own in a profile: speed and separation, as a class.
 
     python examples/06_your_own_restriction.py
 
-No point of the arm comes nearer to an object faster than it could stop in time, as seen by the skin. Put the class in a
-package of yours with an entry point of the group `pretouch.restrictions`, and `paper:approach=separation` works in
-every command.
+It limits the speed of each point of the arm towards a sensed object, so that the arm can stop in time. With an entry
+point of the group `pretouch.restrictions` in a package of yours, `paper:approach=separation` works in every command.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +24,7 @@ from pretouch.sim.scene import Box, SceneSpec
 
 @dataclass(frozen=True)
 class Separation(Restriction, name="separation"):
-    """An approach no faster than leaves `reach_s` of time before `keep_m` is reached."""
+    """Limits the approach so that a point takes at least `reach_s` to the distance `keep_m`."""
 
     keep_m: float = 0.1
     reach_s: float = 0.5
@@ -39,7 +38,7 @@ class Separation(Restriction, name="separation"):
         near: pt.Obstacles,
         request: MotionRequest,
     ) -> tuple[Restricted, Any]:
-        """Return a row for each obstacle: how fast its closest point of the body approaches, and may."""
+        """Return a row and a limit for each obstacle: speed of the body's closest point towards it."""
         model, points = body.model, zip(near.link, near.body_point, near.direction, strict=True)
         rows = [direction @ model.jacobian(kin, int(link), point)[:3] for link, point, direction in points]
         limit = np.maximum(near.body_distance - self.keep_m, 0.0) / self.reach_s
@@ -47,20 +46,20 @@ class Separation(Restriction, name="separation"):
 
 
 class Nearest:
-    """A recorder that keeps how near the arm comes to the board, and how fast it is there."""
+    """A recorder of the least distance to the board, and of the speed there."""
 
     def __init__(self) -> None:
         self.distance, self.speed = np.inf, 0.0
 
     def record(self, cycle: pt.Cycle) -> None:
-        """Look at one step."""
+        """Compare one step with the nearest so far."""
         o, step = cycle.step.obstacles, cycle.step
         if o.body_distance.min(initial=np.inf) < self.distance:
             self.distance, self.speed = float(o.body_distance.min()), float(np.linalg.norm(step.ee_velocity))
 
 
 def main() -> None:
-    """Follow a line into a board for six seconds, with the profile's own restriction left out and with this one."""
+    """Follow a line into a board for six seconds, without a restriction and with this one."""
     model = pt.RobotModel(pt.panda())
     ready = model.kinematics(model.description.q_ready).position[model.ee]
     path = pt.segment(tuple(ready), tuple(ready + np.array([0.0, 0.4, 0.0])))

@@ -24,20 +24,20 @@ start, end = (0.45, -0.2, 0.5), (0.45, 0.3, 0.5)
 board = pt.Box("board", center=(0.45, 0.25, 0.5), half_size=(0.2, 0.02, 0.2), stiffness=25_000.0)
 room = pt.SceneSpec(boxes=(board,))
 
-# the simulated arm and its sensors; the controller knows the room's floor, and nothing of the board
+# the simulated arm and its sensors; the controller knows the room's floor, but not the board
 plant = pt.Plant(arm, room, pt.PlantParams(), pt.brought_to(arm, np.array(start)), seed=1)
 sensors = pt.RangeFinders(plant, skin, pt.RangeFinderParams(), seed=1)
 controller = pt.Controller(arm, skin, pt.fixtures(room), pt.segment(start, end), pt.profile("pretouch"))
 
 
 class Narrator:
-    """A recorder that says what the arm does and why, at each new mode and every half second."""
+    """A recorder that prints what the arm does and why, at each new mode and every half second."""
 
     def __init__(self) -> None:
         self.time, self.mode = -1.0, ""
 
     def record(self, cycle: pt.Cycle) -> None:
-        """Print a step that is worth it."""
+        """Print the first step of a mode, and one every half second."""
         step = cycle.step
         if step.mode.value != self.mode or step.stamp - self.time >= 0.5:
             self.time, self.mode = step.stamp, step.mode.value

@@ -1,10 +1,10 @@
-"""A program with a loop and a commander of its own, protected: a resolved-rate loop that knows of no board.
+"""A protected program with its own loop and commander: a resolved-rate loop without knowledge of the board.
 
     python examples/08_your_own_commander.py
 
-It asks for joint velocities as if nothing could be in the way, into a board. Prints how hard the arm meets it, with
-units that see the board and without. A commander is anything that says what it wants: `pt.desired` has twists, joint
-velocities, poses, joint positions, and horizons of them, each stamped by the clock of the steps.
+It commands joint velocities into a board. Prints the contact force with units that see the board, and without. A
+commander returns a desired motion: `pt.desired` has twists, joint velocities, poses, joint positions, and horizons of
+them, each stamped by the clock of the steps.
 """
 
 from collections import Counter
@@ -33,10 +33,10 @@ for name, profile in (("unprotected", "blind"), ("through pretouch", "pretouch")
     clock, force, limits = pt.PlantClock(plant, shield.controller.limits.period), 0.0, Counter[str]()
     while (now := clock.tick()) < 5.0:
         robot = plant.read()
-        wanted = pt.desired.joint_velocities(now, resolved_rate(robot.q))
-        step = shield(pt.Inputs(now, robot, units.read(), desired=wanted))
+        desired = pt.desired.joint_velocities(now, resolved_rate(robot.q))
+        step = shield(pt.Inputs(now, robot, units.read(), desired=desired))
         plant.command(step.command)
         force = max(force, float(np.linalg.norm(plant.true_force)))
         limits[step.limited.by.value] += 1
-    print(f"{name}: meets the board with {force:.0f} N")
-    print("   steps by what limited them: " + ", ".join(f"{by} {count}" for by, count in limits.most_common()))
+    print(f"{name}: hits the board with {force:.0f} N")
+    print("   steps by their limit: " + ", ".join(f"{by} {count}" for by, count in limits.most_common()))

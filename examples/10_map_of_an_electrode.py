@@ -1,9 +1,9 @@
-"""What distance the signal of a capacitive electrode stands for, fitted to approaches at known distances.
+"""Map from the signal of a capacitive electrode to distance, fitted to approaches at known distances.
 
     python examples/10_map_of_an_electrode.py
 
-The printed table is a sensor type for a skin file. Put your own measurements in place of the ones made here: distances
-[m], and signals less their baseline, of the smallest and the largest thing that may come.
+The printed table is a sensor type for a skin file. Replace the generated data by your measurements: distances [m], and
+signals less their baseline, for the smallest and the largest object that may approach.
 """
 
 import numpy as np
@@ -14,9 +14,9 @@ distance = np.concatenate([approach, approach])
 signal = np.concatenate([size * 2e-4 / (approach + 0.03) ** 2.5 for size in (0.6, 1.4)]) + rng.normal(0.0, 1e-3, 160)
 
 noise = signal[distance > 0.3].std()
-felt = signal > 4.0 * noise
-farthest = approach[felt.reshape(2, -1).all(axis=0)].max()
-near = felt & (distance <= farthest)
+clear = signal > 4.0 * noise
+farthest = approach[clear.reshape(2, -1).all(axis=0)].max()
+near = clear & (distance <= farthest)
 
 
 def log_signal(distance, log_gain, offset, power):

@@ -1,10 +1,10 @@
-"""Train a policy that reaches for goals among people, save it, load it again, and play it under the shield.
+"""Train a policy that reaches for goals among people, save and load it, and run it under the shield.
 
     make learn
     .venv/bin/python -m pip install stable-baselines3
     .venv/bin/python examples/11_train_under_the_shield.py --steps 200000
 
-With `--alone` there is nothing but joint limits between policy and arm, in training and after it.
+With `--alone` only joint limits are between policy and arm, in training and afterwards.
 """
 
 import argparse
@@ -19,8 +19,8 @@ except ImportError:
     raise SystemExit("This example needs stable-baselines3: run python -m pip install stable-baselines3") from None
 
 parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-parser.add_argument("--steps", type=int, default=200_000, help="of training, of 0.05 s of simulated time each")
-parser.add_argument("--episodes", type=int, default=3, help="to play with what was learnt")
+parser.add_argument("--steps", type=int, default=200_000, help="training steps, each 0.05 s of simulated time")
+parser.add_argument("--episodes", type=int, default=3, help="episodes to run with the trained policy")
 parser.add_argument("--file", default="policy.zip")
 parser.add_argument("--alone", action="store_true", help="no shield")
 options = parser.parse_args()

@@ -2,7 +2,7 @@
 
     python examples/simulated_arm.py
 
-Put in your own skin with `load_skin(Path("my_skin.toml"), model)`, your own path with `WayPoints`, your own parameters
+Use your own skin with `load_skin(Path("my_skin.toml"), model)`, your own path with `WayPoints`, and your own parameters
 with `dataclasses.replace`.
 """
 
@@ -24,13 +24,13 @@ from pretouch.sim.scene import Box, SceneSpec, fixtures
 
 
 class Narrator:
-    """A recorder that says what the arm does, each time that it begins to do something else."""
+    """A recorder that prints each new activity of the arm."""
 
     def __init__(self, units: tuple[str, ...], links: tuple[str, ...]) -> None:
         self._names, self._doing = (units, links), ""
 
     def record(self, cycle: Cycle) -> None:
-        """Print a step that begins something."""
+        """Print the first step of an activity."""
         explanation = explain(cycle.step, *self._names)
         if explanation.doing.value != self._doing:
             self._doing = explanation.doing.value
@@ -41,7 +41,7 @@ def main() -> None:
     """Run twelve seconds."""
     model = RobotModel(panda())
     path = Circle()
-    # with its restrictions the arm would never touch the board; take them away to see it anticipate and react
+    # with restrictions the arm would never touch the board; without them it anticipates and reacts
     settings = replace(profile("paper"), approach=None)
     board = Box("board", center=(0.62, -0.27, 0.5), half_size=(0.15, 0.02, 0.12), stiffness=25_000.0)
     room = SceneSpec(boxes=(board,))

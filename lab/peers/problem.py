@@ -4,8 +4,8 @@ The answer in each snapshot are the joint velocities qd that minimise
 
     1/2 |v - J qd|^2 + mu/2 |qd|^2 + k/2 |(q_mid - q) / t - qd|^2
 
-within the joint box (position, velocity and acceleration limits) and one approach row G qd <= h a point (eqs. 5-7 of the
-paper). The snapshots are on a smooth motion. Random points round the arm are used if their row allows the motion
+within the joint box (position, velocity and acceleration limits) and one approach row G qd <= h a point (eqs. 5-7 of
+the paper). The snapshots are on a smooth motion. Random points round the arm are used if their row allows the motion
 itself with a margin, so every problem is feasible. Half of the points have the smallest margins, so it is barely so.
 
 The code is plain NumPy, vectorised over points, as a user of a peer would write it. It imports nothing of Pretouch, so
