@@ -63,7 +63,8 @@ class TouchSample(NamedTuple):
 
 
 Forces = Callable[[float], list[PointForce]]
-"""Gives the forces that act on the arm at a time."""
+"""Returns the forces that act on the arm at a time."""
+Send = Callable[[TouchSample], None] | None
 
 
 def no_forces(_time: float) -> list[PointForce]:
@@ -72,16 +73,15 @@ def no_forces(_time: float) -> list[PointForce]:
 
 
 class TouchSensors:
-    """The touch sensors of a skin's units, which measure contacts of the simulated arm and forces laid on it.
+    """The touch sensors of a skin's units, which measure contacts of the simulated arm and forces applied to it.
 
-    A unit that sits on a force's link measures it if it acts within the patch: no farther from the unit's axis than its
-    radius, and on the unit's side of the link. What is measured is the part of it that presses on the unit.
+    A unit on a force's link measures the force if it acts within the patch: no farther from the unit's axis than its
+    radius, and on the unit's side of the link. The sensor measures the component that presses on the unit.
     """
 
     def __init__(
-        self, plant: ArmInWorld, skin: Skin, params: TouchErrors, seed: int, laid: Forces = no_forces,
-        send: Callable[[TouchSample], None] | None = None,
-    ) -> None:  # fmt: skip
+        self, plant: ArmInWorld, skin: Skin, params: TouchErrors, seed: int, laid: Forces = no_forces, send: Send = None
+    ) -> None:
         """Mount the sensors on a simulated arm; the seed decides their errors, phases, noise and losses.
 
         Args:
