@@ -14,7 +14,7 @@ def test_a_benchmark_writes_numbers_and_tables_and_a_folder_of_others_is_refused
     out, numbers = tmp_path / "run", tmp_path / "numbers.json"
     words = ["bench", "shield", "--quick", "--processes", "1", "--out", str(out), "--json", str(numbers)]
     assert cli.main([*words, "--seeds", "development"]) == 0
-    assert "What holds whoever commands" in capsys.readouterr().out
+    assert "limits that hold for any command" in capsys.readouterr().out
     found = json.loads(numbers.read_text())
     assert found["about"]["quick"] is True
     assert [(row["filter"], row["steps"]) for row in found["rows"]] == [("paper", 9), ("none", 9)]

@@ -183,7 +183,7 @@ def tables(summary: Row) -> list[TextTable]:
             table(f"{family.capitalize()}: contact and cost", _COLUMNS, cells, f"{texts[family]} {_NOTE}", 2)
             for family, cells in ((key["family"], cells) for key, cells in grouped(summary["cells"], ("family",)))
         ),
-        table("Each switch of pretouch off alone, in the closed loop", _ABLATED, by_scene, note, 2),
+        table("Pretouch with one switch off at a time, in the closed loop", _ABLATED, by_scene, note, 2),
     ]
     return [each for each in every if each.rows]
 

@@ -285,4 +285,4 @@ def tables(groups: list[Row]) -> list[TextTable]:
         " the goal of the ordinary commander. change: rms difference of the end-effector's velocities before and after"
         " the filter."
     )
-    return [table("What holds whoever commands, and what it costs", _COLUMNS, groups, note, 2)]
+    return [table("Filters: limits that hold for any command, and interventions", _COLUMNS, groups, note, 2)]
