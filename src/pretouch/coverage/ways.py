@@ -19,6 +19,8 @@ _STILL = 1e-9
 """Speed below which a point of the arm counts as at rest, for a hand at 1 m/s."""
 _STEP_S = 1e-6
 """Time step of numerical velocities [s]."""
+_Postures = tuple[Kinematics, ...]
+_Paths = tuple[IntArray, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +32,7 @@ class Ways:
     params: CoverageParams
     surface: Surface
     """P points."""
-    postures: tuple[Kinematics, ...]
+    postures: _Postures
     """S postures."""
     point: IntArray
     """(W,) index of the surface point of each way, the same in all postures."""
@@ -105,9 +107,8 @@ def _normals(kin: Kinematics, surface: Surface) -> FloatArray:
 
 
 def _ways(
-    model: RobotModel, room: Fixtures, params: CoverageParams, surface: Surface, postures: tuple[Kinematics, ...],
-    paths: tuple[IntArray, FloatArray, FloatArray],
-) -> Ways:  # fmt: skip
+    model: RobotModel, room: Fixtures, params: CoverageParams, surface: Surface, postures: _Postures, paths: _Paths
+) -> Ways:
     """Return the ways of the ball for points (W,), directions (S, W, 3) and weights (S, W); 0 for ways not free."""
     point, way, weight = paths
     arm, about, r = model.capsules, room.capsules, params.object_radius_m
