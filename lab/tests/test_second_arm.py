@@ -27,13 +27,10 @@ def facing(model: RobotModel, apart: float, params: PlantParams = NO_ERROR) -> t
     return first, second
 
 
-def test_a_base_pose():
+def test_the_links_stand_where_the_base_says(panda_model):
     # x of the second arm is y of the first
     T = BasePose((1.2, 0.3, 0.1), np.pi / 2).T
     assert pytest.approx([1.2, 0.4, 0.6, 1.0]) == T @ [0.1, 0.0, 0.5, 1.0]
-
-
-def test_the_links_stand_where_the_base_says(panda_model):
     _, second = facing(panda_model, APART_M)
     kin, links = panda_model.kinematics(panda_model.description.q_ready), len(panda_model.links)
     x, y, z = kin.position[1:].T

@@ -103,8 +103,8 @@ def test_units_measure_what_the_plan_does_at_the_same_instants(panda_model, skin
     assert np.abs(planned - data.joints.q).max() < 0.02
 
 
-def test_each_units_stamps_are_late_by_its_own_clock(panda_model, skin):
-    right = simulate(panda_model, skin, STILL, 3, clock_error_s=0.0)
+def test_each_units_stamps_are_late_by_its_own_clock_and_full_scales_are_those_of_sixteen_bits(panda_model, skin):
+    right = simulate(panda_model, skin, STILL, 3, clock_error_s=0.0, links_known=False)
     wrong = simulate(panda_model, skin, STILL, 3)
     late = clock_errors(len(skin), 3)
     assert np.ptp(late) > 0.01
@@ -112,13 +112,9 @@ def test_each_units_stamps_are_late_by_its_own_clock(panda_model, skin):
     for k in range(len(skin)):
         assert wrong.units[k].imu.stamp - right.units[k].imu.stamp == pytest.approx(late[k])
         assert np.array_equal(wrong.units[k].imu.acceleration, right.units[k].imu.acceleration)
-
-
-def test_full_scales_are_those_of_sixteen_bits(panda_model, skin):
-    data = simulate(panda_model, skin, STILL, 0, links_known=False)
-    assert [unit.acceleration_max for unit in data.units] == pytest.approx([4 * 9.80665] * len(skin), rel=1e-3)
-    assert data.units[0].angular_velocity_max == pytest.approx(np.deg2rad(32767 * 0.0175))
-    assert {unit.link for unit in data.units} == {None}
+    assert [unit.acceleration_max for unit in right.units] == pytest.approx([4 * 9.80665] * len(skin), rel=1e-3)
+    assert right.units[0].angular_velocity_max == pytest.approx(np.deg2rad(32767 * 0.0175))
+    assert {unit.link for unit in right.units} == {None}
 
 
 def test_a_plan_the_arm_cannot_follow_is_said_to_be_so(panda_model, skin):

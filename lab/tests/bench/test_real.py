@@ -64,7 +64,7 @@ def test_a_file_of_arrays_is_read_run_by_run_without_what_the_logger_missed(tmp_
 
 
 def glove_csv(file, motion, label):
-    """Write a motion as contactInterpretation has it: each state twice, columns of which some are not read."""
+    """Write a motion as contactInterpretation has it, with columns that are not read."""
     columns = {"index": np.arange(len(motion.time)), "time": motion.time}
     kinds = ("tau_J", motion.driving), ("tau_ext", -motion.external), ("q", motion.q), ("dq", motion.qd)
     columns |= {f"{kind}{j}": values[:, j] for kind, values in kinds for j in range(7)}
@@ -73,20 +73,16 @@ def glove_csv(file, motion, label):
     write_csv(file, columns)
 
 
-def touching(motion):
-    return ((motion.time >= PUSH[0]) & (motion.time < PUSH[0] + PUSH[1])).astype(int)
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory, panda_model, motions):
     """A set of free motion, and one of contacts on link 5 whose last run nobody touches."""
-    made = tmp_path_factory.mktemp("sets")
-    np.savez(made / "franka_fast.npz", **arrays(motions))
-    for name, pushes in (("e1", (PUSH,)), ("e2", (PUSH,)), ("e3", (PUSH,)), ("e4", ())):
-        motion = Moving(panda_model, 6.0, pushes, rate=200.0, seed=int(name[1]))
-        touched = touching(motion) * (len(pushes) > 0)
-        glove_csv(made / "contactInterpretation" / "link5" / f"{name}.csv", motion, touched)
-    return made
+    sets = tmp_path_factory.mktemp("sets")
+    np.savez(sets / "franka_fast.npz", **arrays(motions))
+    for seed, pushes in enumerate(((PUSH,), (PUSH,), (PUSH,), ()), 1):
+        motion = Moving(panda_model, 6.0, pushes, rate=200.0, seed=seed)
+        label = len(pushes) * ((motion.time >= PUSH[0]) & (motion.time < PUSH[0] + PUSH[1]))
+        glove_csv(sets / "contactInterpretation" / "link5" / f"e{seed}.csv", motion, label)
+    return sets
 
 
 def test_a_table_of_the_glove_gives_measured_torques_its_label_and_its_folders_link(folder):
@@ -201,11 +197,9 @@ def test_the_whole_command_writes_a_row_for_each_set_table_and_detector(folder, 
     place, out = tmp_path / "rows.json", str(tmp_path / "out")
     words = ["bench", "real", str(folder), "--detectors", "pretouch,fixed", "--json", str(place), "--out", out]
     assert cli.main(words) == 0
-    told = json.loads(place.read_text())
-    said = capsys.readouterr()
-    assert "lwr4 is left out, for" in said.err
-    kinds = ("free", "contacts")
-    rows = {(row["set"], kind, row["detector"]): row[kind] for row in told["rows"] for kind in kinds if kind in row}
+    numbers, kinds = json.loads(place.read_text()), ("free", "contacts")
+    assert "lwr4 is left out, for" in capsys.readouterr().err
+    rows = {(row["set"], kind, row["detector"]): row[kind] for row in numbers["rows"] for kind in kinds if kind in row}
     sets = [("franka_fast", "free"), ("contactInterpretation", "free"), ("contactInterpretation", "contacts")]
     assert set(rows) == {(*each, detector) for each in sets for detector in ("pretouch", "fixed")}
     row = rows["contactInterpretation", "contacts", "pretouch"]

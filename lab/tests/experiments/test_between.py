@@ -64,7 +64,7 @@ def test_body_and_hand_are_on_opposite_sides_and_move_with_the_seed():
     assert len({body.center for body, _ in planned}) == len({push.force for _, push in planned}) == 20
 
 
-def test_summary_and_table_count_what_the_rows_say(trials):
+def test_the_table_counts_what_the_rows_say(trials):
     rows = [json.loads(json.dumps(row, allow_nan=False)) for row, _ in trials.values()]
     (table,) = between.tables([*rows, {**rows[1], "detected": False, "detection_delay_s": None}])
     assert [row[0] for row in table.rows] == ["blind\noff", "paper\nslack"]
