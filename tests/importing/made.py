@@ -63,6 +63,7 @@ def written(folder: Path, text: str, name: str = "arm.urdf") -> Path:
 def equipped(folder: Path, units: int = 8) -> Path:
     """Put a skin of suggested units into the folder of an imported arm."""
     model = RobotModel(load_description(folder))
-    ways = CoverageSetting(model, floor_and_pedestal(-0.2), CoverageParams(), "joints", 4).ways()
-    save_skin(Skin(suggest((ways,), Skin([], model), units).units, model), folder / OWN_SKIN)
+    setting = CoverageSetting(model, floor_and_pedestal(-0.2), CoverageParams(), "joints", 4)
+    paths = setting.ways(), setting.met()
+    save_skin(Skin(suggest(paths, Skin([], model), units).units, model), folder / OWN_SKIN)
     return folder
