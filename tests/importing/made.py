@@ -64,6 +64,5 @@ def equipped(folder: Path, units: int = 8) -> Path:
     """Put a skin of suggested units into the folder of an imported arm."""
     model = RobotModel(load_description(folder))
     setting = CoverageSetting(model, floor_and_pedestal(-0.2), CoverageParams(), "joints", 4)
-    paths = setting.ways(), setting.met()
-    save_skin(Skin(suggest(paths, Skin([], model), units).units, model), folder / OWN_SKIN)
+    save_skin(Skin(suggest((setting.ways(), setting.met()), Skin([], model), units).units, model), folder / OWN_SKIN)
     return folder
