@@ -86,15 +86,15 @@ def _contact(
     if touched is None:
         return row | {"push_s": 0.0}
     touch, release = touched
-    answers = [(s, v) for s, v in beginnings if touch <= s.stamp <= release + _REBOUND_S]
+    later = [t.time for t in record.touches if t.time > release]  # the floor, say: answered by itself
+    end = min([release + _REBOUND_S, *later])
+    answers = [(s, v) for s, v in beginnings if touch <= s.stamp <= end]
     pushed = _mean_force(record, touch, release)
     row["reaction_towards_person"] = any(float(v @ pushed) < 0 for _, v in answers)
     if answers and answers[0][0].stamp <= release + _NOTICE_S:
         first, velocity = answers[0]
-        row["detected"] = True
-        row["delay_s"] = rounded(first.stamp - touch, 4)
-        before = _mean_force(record, max(touch, first.stamp - 0.05), first.stamp)
-        angle = angle_deg(velocity, before)
+        row |= {"detected": True, "delay_s": rounded(first.stamp - touch, 4)}
+        angle = angle_deg(velocity, _mean_force(record, max(touch, first.stamp - 0.05), first.stamp))
         row["direction_error_deg"] = None if angle is None else rounded(angle, 2)
     return row
 
