@@ -187,6 +187,17 @@ def test_eight_by_eight_zones_measure_slower():
     assert VL53L7CX().angle == pytest.approx(np.deg2rad(15.0) * 2 / np.sqrt(np.pi))  # a cone as large as a zone
 
 
+def test_each_type_has_its_bursts_delay_and_period():
+    timing = cones_of([PAPER_SENSOR, VL53L7CX(), VL53L5CX(zones=8), Whistle()]).timing
+    blind, delay, period = timing.T
+    assert blind == pytest.approx([0.0, 0.86, 0.86, 0.0])
+    # 8 x 8: the middle of its four parts of 1/60 s is 25 ms before that of the last
+    assert delay == pytest.approx([0.0075, 0.034, 0.059, 0.0])
+    assert period == pytest.approx([1 / 50, 1 / 60, 1 / 15, 1 / 10])
+    with pytest.raises(ParameterError, match="blind_s is -1"):
+        VL53L7CX(blind_s=-1.0)
+
+
 # a unit
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
 
-from pretouch.checks import Check, Positive
+from pretouch.checks import Check, NonNegative, Positive
 from pretouch.composition import Part
 from pretouch.errors import ParameterError, SkinError
 from pretouch.types import FloatArray, IntArray, Number
@@ -49,6 +49,13 @@ class Sensor(Part, group="pretouch.sensors"):
     """Readings in a second, at most [Hz]."""
     noise: Positive = 1.0
     """Noise relative to the VL53L1X's in the simulation [1]."""
+    blind_s: NonNegative = 0.0
+    """Longest burst of "no target" before a near target [s]: shorter ones are no evidence of free space.
+
+    0, unless somebody has measured one: each "no target" counts.
+    """
+    delay_s: NonNegative = 0.0
+    """Time from the middle of a measurement to the moment that a reading is ready [s]."""
     own_name: str = ""
     """Name in the skin file that describes it; '' for other types."""
 
@@ -63,6 +70,11 @@ class Sensor(Part, group="pretouch.sensors"):
     def ranging(self, mode: str) -> RangingMode:
         """Return one of its distance modes; a sensor without modes has a single one."""
         return RangingMode(1.0 / self.rate_hz, self.farthest_m)
+
+    @property
+    def timing(self) -> tuple[float, float, float]:
+        """`blind_s`, the delay of the middle of a reading, and the period in the fastest mode [s]."""
+        return self.blind_s, self.delay_s, self.ranging("short").period_s
 
     @property
     def label(self) -> str:
@@ -110,7 +122,14 @@ _MODES = {"short": RangingMode(period_s=0.02, distance_max_m=1.3), "long": Rangi
 
 @dataclass(frozen=True)
 class VL53L1X(Sensor, name="vl53l1x"):
-    """ST's time-of-flight sensor of the paper (data sheet DS12385: 16 x 16 SPADs, 27 degrees, 4 cm to 4 m)."""
+    """ST's time-of-flight sensor of the paper (data sheet DS12385: 16 x 16 SPADs, 27 degrees, 4 cm to 4 m).
+
+    No burst of "no target" is known: 1230 readings of a table in a row are all numbers
+    (github.com/daniel-carlebach/vl53l1x_testing). Its delay was never published.
+    """
+
+    delay_s: NonNegative = 0.0075
+    """Half of the 15 ms in which our firmware lets it measure: what it needs besides is not known [s]."""
 
     def ranging(self, mode: str) -> RangingMode:
         """See `Sensor`; modes are short and long."""
@@ -131,6 +150,13 @@ class VL53L5CX(Sensor, name="vl53l5cx"):
     nearest_m: Positive = 0.02
     rate_hz: Positive = 60.0
     noise: Positive = 2.0
+    blind_s: NonNegative = 0.86
+    """Square to a panel at 0.35 to 0.5 m, 8 x 8 zones (flights of github.com/ETH-PBL/Matrix_ToF_Drones) [s]."""
+    delay_s: NonNegative = 0.034
+    """Of 4 x 4 zones [s]: half of their 17 ms, and half of the 51 ms by which the last zones of 8 x 8 trail besides.
+
+    Those flights show 51 ms, but not how much of it is the sensor's: half of it errs by 25 ms at most.
+    """
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -141,6 +167,12 @@ class VL53L5CX(Sensor, name="vl53l5cx"):
         """See `Sensor`; mode short is that of the paper's skins, whose range is enough."""
         rate = min(self.rate_hz, _FASTEST_HZ[self.zones])
         return RangingMode(1.0 / rate, min(_GREY_M[self.zones], self.farthest_m))
+
+    @property
+    def timing(self) -> tuple[float, float, float]:
+        """See `Sensor`; 8 x 8 are measured in four parts, one after another, each as long as a measurement of 4 x 4."""
+        blind_s, delay_s, period_s = super().timing
+        return blind_s, delay_s + (1.5 / _FASTEST_HZ[4] if self.zones == 8 else 0.0), period_s
 
 
 _FASTEST_HZ = {4: 60.0, 8: 15.0}
@@ -221,6 +253,8 @@ class Cones(NamedTuple):
     """(T, R, 3) unit vectors that fill the cone, sensor frame, the axis first."""
     spread: Annotated[FloatArray, "T"]
     """(T,) standard deviation of a target's direction, without that of the unit's own orientation [rad]."""
+    timing: Annotated[FloatArray, "T", 3]
+    """(T, 3) longest burst of "no target", delay of a reading, period of the fastest mode [s]."""
 
 
 PAPER_SENSOR = VL53L1X()
@@ -250,6 +284,7 @@ def cones_of(sensors: Sequence[Sensor]) -> Cones:
         np.array([[kind.nearest_m, kind.farthest_m] for kind in kinds]),
         np.array([cone_rays(RINGS, kind.angle) for kind in kinds]),
         np.array([kind.spread for kind in kinds]),
+        np.array([kind.timing for kind in kinds]),
     )
 
 
