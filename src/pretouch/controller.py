@@ -85,8 +85,10 @@ class Controller:
         """A restriction in plain Python; None if it is compiled."""
         self._begin_approach = None if self.approach is None else self.approach.init(self.motion_body)
         self.touching = profile.detect.reads_touch and len(skin.touching) > 0
-        self.outside_places = profile.outside_per_link * len(model.parts)
-        """Largest number of outside points."""
+        see = profile.perception
+        self.remembers = see is not None and see.memory is not None
+        self.slots = len(model.parts) * see.memory.per_link if see is not None and see.memory else len(skin)
+        """Largest number of obstacles that are seen."""
         self.beside = fixtures.capsules
         self.fixed, self._begin = Flat.of(fixed_of(self)), Flat.of(remembered_init(self))
         self.blank = now = Flat.of(now_init(self))
@@ -123,11 +125,11 @@ class Controller:
         if not same_units or remembered.places["command"].shape != memory.places["command"].shape:
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
         same_window = mine.window.samples == theirs.window.samples and type(mine.detect) is type(theirs.detect)
-        same_points = self.outside_places == before.outside_places
-        parts = ["watch", "tracks", "pace", "command", "rotation_goal"] + ["outside"] * same_points
+        same_slots = self.slots == before.slots and self.remembers == before.remembers
+        parts = ["watch", "tracks", "pace", "command", "rotation_goal", "places", "source_stamp"]
         parts += ["window"] * same_window + ["null_velocity"] * (mine.null_space == theirs.null_space)
         parts += ["mass"] * (type(mine.react) is type(theirs.react))
-        memory.take(remembered, parts + ["slots"] * (mine.approach == theirs.approach and same_points))
+        memory.take(remembered, parts + ["slots"] * (mine.approach == theirs.approach and same_slots))
         watch = memory.part("watch", Watched)
         take_sent(watch, remembered.part("watch", Watched))
         if "mass" not in parts:

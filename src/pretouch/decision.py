@@ -17,7 +17,7 @@ from pretouch.line import ASK, MOVE, SEE, line_points, line_within
 from pretouch.line_records import PYTHON, SEQUENTIAL
 from pretouch.modes import CLEAR, Event, QpOutcome, next_mode, outcome_of
 from pretouch.perception.closest import beside, near_moving
-from pretouch.perception.external_points import outside_init, outside_silence
+from pretouch.perception.external_points import outside_silence
 from pretouch.perception.obstacles import silent_units, track_init
 from pretouch.records import Flat
 from pretouch.robot.kinematics import Kinematics
@@ -92,7 +92,8 @@ class Decision:
         self.now.fill("readings", self.readings)
         if Event.TIME_BACKWARDS in self.events:
             memory.fill("tracks", track_init(units))
-            memory.fill("outside", outside_init(controller.outside_places, -np.inf if self._has_source else np.nan))
+            memory.put("places.number", 0)
+            memory.put("source_stamp", -np.inf if self._has_source else np.nan)
         if self.moving is not None and p.perception is not None:
             fixtures, persistence = controller.fixtures.capsules, p.perception.persistence_s
             self.beside = beside(fixtures, self.moving, self.readings, self.stamp, persistence)
@@ -106,7 +107,7 @@ class Decision:
         now, see, stamp, robot, controller = self.now, self.profile.perception, self.stamp, self.robot, self.controller
         report = now.part("robot", Report)
         put_robot(report, robot)
-        if self.points is not None and controller.outside_places:
+        if self.points is not None and see is not None and see.outside is not None:
             blocks = controller.fixed.blocks, self.memory.blocks, now.blocks
             line_points(*blocks, self.points, controller.beside)
         controller.take(self.memory, now, self.beside, SEE, SEE)
@@ -116,27 +117,27 @@ class Decision:
             put_robot(report, self.robot)
         if see is not None:
             skin, silence_scale = controller.skin, now.get("scene.silence_scale")
-            last = self.memory.get("tracks.report_stamp")
+            last = self.memory.get("tracks.report_stamp") + skin.late
             self.silent = silent_units(skin, last, self.readings.status, stamp, see.silent_after_s)
             self.watched = len(skin) > 0 and silence_scale >= 1.0 and not self.silent
-            slower, self.lost = outside_silence(self.memory.get("outside.source_stamp"), self.lost, stamp, see.outside)
+            slower, self.lost = outside_silence(self.memory.get("source_stamp"), self.lost, stamp, see.outside)
             now.put("scene.silence_scale", min(silence_scale, slower))
             self._note({Event.SKIN_SILENT: self.silent, Event.POINTS_LOST: self.lost})
         else:
             self.lost = ""
         self.near = near_of(now, "scene.sensed")
         if self.moving is not None:
-            places = len(controller.skin) + controller.outside_places
-            first, near = now.get("scene.sensed"), near_moving(self.moving, self.model, kin, stamp, places)
+            first = now.get("scene.sensed")
+            near = near_moving(self.moving, self.model, kin, stamp, (len(controller.skin) + 1, controller.slots))
             for room, part in zip(now.part("scene.near", Obstacles), near, strict=True):
                 room[first : first + len(part)] = part
             now.put("scene.total", first + len(near.unit))
-            now.put("request.untouched", places)
+            now.put("request.untouched", controller.slots)
 
     @property
     def _has_source(self) -> bool:
         """Return whether there was a source of outside points."""
-        return not np.isnan(self.memory.get("outside.source_stamp"))
+        return not np.isnan(self.memory.get("source_stamp"))
 
     def _detect(self) -> tuple[Detection, Any]:
         """Distinguish a contact from free motion (eqs. 8-11); return the detection and the detector's state."""

@@ -29,7 +29,7 @@ from pretouch.perception.perceive import perceive
 from pretouch.records import Blocks, opener
 from pretouch.robot.body import Capsules
 from pretouch.robot.kinematics import Chain, place
-from pretouch.types import FloatArray, SeenPoints, some_of
+from pretouch.types import SEEN_NOW_S, FloatArray, SeenPoints, some_of
 
 CHECK, SEE, DETECT, ASK, MOVE = range(5)
 """Stages of a step."""
@@ -58,19 +58,21 @@ def line(fixed: Blocks, remembered: Blocks, now: Blocks, beside: Capsules, first
     return True
 
 
-_sight, _tracks = opener(Fixed, "hinges", "mechanism.arm", "sight"), opener(Remembered, "tracks", "outside")
+_sight = opener(Fixed, "hinges", "mechanism.arm", "sight")
+_tracks = opener(Remembered, "tracks", "places", "source_stamp")
 _perceived = opener(Now, "stamp", "robot", "readings", "kin", "ee", "scene")
 
 
 @inlined
 def see(fixed: Blocks, remembered: Blocks, now: Blocks, beside: Capsules) -> float:
     """Compute the posture and the obstacles (eq. 1); return the factor on the speed for units that fall silent."""
-    (hinges, arm, sight), memory = _sight(fixed), _tracks(remembered)
+    (hinges, arm, sight), (tracks, places, source_stamp) = _sight(fixed), _tracks(remembered)
     stamp, robot, readings, kin, ee, scene = _perceived(now)
     place(hinges, robot.q, kin)
     ee[:] = kin.position[arm.ee]
     scene.sensed[0], scene.nearest[0], scene.silence_scale[0] = 0, np.inf, 1.0
-    if sight.sees or memory[1].source_stamp[0] > -np.inf:
+    if sight.sees or source_stamp[0] > -np.inf:
+        memory = tracks, places
         posture = kin, Chain(kin.anchor, kin.axis, arm.moved_by, robot.qd), ee
         count, nearest, oldest = perceive(sight, memory, readings, scene, posture, (stamp[0], robot.stamp[0]), beside)
         silence, p = stamp[0] - oldest, sight.perception
@@ -82,16 +84,16 @@ def see(fixed: Blocks, remembered: Blocks, now: Blocks, beside: Capsules) -> flo
     return scene.silence_scale[0]
 
 
-_points, _place = opener(Remembered, "outside"), opener(Now, "stamp", "robot", "kin")
+_points, _place = opener(Remembered, "places", "source_stamp"), opener(Now, "stamp", "robot", "kin")
 
 
 @entry
 def line_points(fixed: Blocks, remembered: Blocks, now: Blocks, points: SeenPoints, beside: Capsules) -> None:
     """Add points of outside sources before the stage `SEE`; a step in one call has none."""
-    (hinges, arm, sight), (outside,), (stamp, robot, kin) = _sight(fixed), _points(remembered), _place(now)
+    (hinges, arm, sight), memory, (stamp, robot, kin) = _sight(fixed), _points(remembered), _place(now)
     place(hinges, robot.q, kin)
     chain = Chain(kin.anchor, kin.axis, arm.moved_by, robot.qd)
-    take_points(sight, outside, points, (kin, chain), (stamp[0], robot.stamp[0]), beside)
+    take_points(sight, memory, points, (kin, chain), (stamp[0], robot.stamp[0]), beside)
 
 
 _detection = opener(Fixed, "kinds", "window", "filtered", "thresholds", "notes_path")
@@ -164,11 +166,13 @@ def move(fixed: Blocks, remembered: Blocks, now: Blocks) -> None:
         # posture as measured, speeds as commanded: a row tightens from what the arm was sent last
         chain = Chain(kin.anchor, kin.axis, mechanism.arm.moved_by, robot.qd_commanded)
         touch, deadband = braking.touch, braking.deadband_m_s
+        untouched = request.untouched[0], braking.curve.untouched_s, np.inf
         if not np.isnan(request.touch_m_s[0]):
-            # a touch speed whatever the mass; the speeds of the objects themselves do not count
+            # a touch speed whatever the mass; the speeds of the objects do not count, nor what was seen before
             touch, deadband = TouchLimits(np.inf, 1.0, 1.0, request.touch_m_s[0]), np.inf
+            untouched = request.untouched[0], 0.0, SEEN_NOW_S
         L = inertia_factor(braking, kin, mechanism) if count[0] > 0 else np.empty((0, 0))
-        rows = braking_rows(braking, slots, near, chain, L, (touch, deadband, request.untouched[0]))
+        rows = braking_rows(braking, slots, near, chain, L, (touch, deadband), untouched)
     move_within(motion, robot, (kin, ee, near), request, rows, (free, free), null_velocity, answer)
     command[:] = answer.command
     go_on(fixed, remembered, now)

@@ -12,7 +12,7 @@ from pretouch.control.motion import MotionAnswer, MotionNumbers
 from pretouch.control.path import OnPath, PathPace
 from pretouch.faults import Watched
 from pretouch.params import FailureParams, RestrictionParams, ThresholdParams, WindowParams
-from pretouch.perception.external_points import OutsideState
+from pretouch.perception.local_map import LocalMap
 from pretouch.perception.obstacles import Sight, TrackState
 from pretouch.perception.perceive import PerceivedScene, Readings
 from pretouch.records import Cell
@@ -69,7 +69,9 @@ class Remembered(NamedTuple):
 
     watch: Watched
     tracks: TrackState
-    outside: OutsideState
+    places: LocalMap
+    source_stamp: Cell
+    """Stamp of the newest points of outside sources [s]: -inf before the first, NaN without a source so far."""
     window: Window
     test: SequentialState
     mass: VirtualMass

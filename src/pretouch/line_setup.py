@@ -33,8 +33,8 @@ from pretouch.line_records import (
     Now,
     Remembered,
 )
-from pretouch.params import NullSpaceMotion, OutsidePoints, PerceptionParams, SequentialParams
-from pretouch.perception.external_points import outside_init
+from pretouch.params import LocalMapParams, NullSpaceMotion, OutsidePoints, PerceptionParams, SequentialParams
+from pretouch.perception.local_map import MOST_PLACES, map_init
 from pretouch.perception.obstacles import Sight, track_init
 from pretouch.records import zeros
 from pretouch.types import no_obstacles
@@ -62,10 +62,10 @@ def fixed_of(controller: Any) -> Fixed:
         kinds, model.hinges, model.mechanism, limits.qd_max, failure,
         Sight(
             see is not None and len(skin) > 0, perception.self_margin_m is not None, perception.self_margin_m or 0.0,
-            0.0 if perception.closing is None else perception.closing.memory_s,
-            0.0 if skin.exact else perception.spread_sigmas,
-            model.capsules, model.body, controller.fixtures.planes, skin.arrays, perception,
-            perception.outside or OutsidePoints(),
+            perception.memory is not None, 0.0 if skin.exact else perception.spread_sigmas,
+            model.capsules, model.body, controller.fixtures.planes, skin.arrays, skin.late,
+            np.searchsorted(model.parts, np.arange(len(model.links))), perception,
+            perception.memory or LocalMapParams(), perception.outside or OutsidePoints(),
         ),
         profile.window, thresholds.compare == "filtered", thresholds,
         sequential_numbers(n, limits.period, test), np.ones(len(model.links)),
@@ -80,9 +80,9 @@ def fixed_of(controller: Any) -> Fixed:
     )  # fmt: skip
 
 
-def _places(controller: Any) -> int:
-    """Return the largest number of obstacles: of units, outside points, and links beside moving fixtures."""
-    return len(controller.skin) + controller.outside_places + len(controller.model.parts)
+def _most_obstacles(controller: Any) -> int:
+    """Return the largest number of obstacles, those of links beside moving fixtures last."""
+    return int(controller.slots + len(controller.model.parts))
 
 
 def remembered_init(controller: Any) -> Remembered:
@@ -92,16 +92,17 @@ def remembered_init(controller: Any) -> Remembered:
     zero, cycles = np.zeros(1), np.zeros(1, np.int64)
     return Remembered(
         zeros(Watched, n=n, S=sent),
-        track_init(len(controller.skin)), outside_init(controller.outside_places), window_init(profile.window.samples),
+        track_init(len(controller.skin)), map_init(MOST_PLACES if controller.remembers else 0), np.full(1, np.nan),
+        window_init(profile.window.samples),
         sequential_init(n if kinds.detect == SEQUENTIAL else 0, SequentialParams()),
         mass_init(n, Admittance.of_kind(profile.react)), PathPace(np.ones(1), cycles, zero, zero),
-        slots_init(_places(controller) if kinds.approach == BRAKING else 0), none, none, np.eye(3),
+        slots_init(_most_obstacles(controller) if kinds.approach == BRAKING else 0), none, none, np.eye(3),
     )  # fmt: skip
 
 
 def now_init(controller: Any) -> Now:
     """Return the values that each step starts from."""
-    model, places = controller.model, _places(controller)
+    model, places = controller.model, _most_obstacles(controller)
     now = zeros(Now, n=model.n, L=len(model.links), K=len(controller.skin), M=places, W=len(LENGTHS))
     return now._replace(
         scene=now.scene._replace(near=no_obstacles(places), silence_scale=np.ones(1)),

@@ -17,11 +17,11 @@ from pretouch.control.approach import ApproachRestriction, BrakingCurve, Restric
 from pretouch.errors import ParameterError
 from pretouch.params import (
     ClampParams,
-    ClosingSpeed,
     EffectiveMass,
     FailureParams,
     GiveUpParams,
     LocalisationParams,
+    LocalMapParams,
     NullSpaceMotion,
     OutsidePoints,
     PerceptionParams,
@@ -69,12 +69,6 @@ class Profile(Checked):
         return self.perception or PerceptionParams()
 
     @property
-    def outside_per_link(self) -> int:
-        """Number of outside points for each link; 0: outside points are not used."""
-        outside = None if self.perception is None else self.perception.outside
-        return 0 if outside is None else outside.per_link
-
-    @property
     def d_max_m(self) -> float:
         """Distance from the end-effector origin within which an obstacle is near it [m]: of eq. 3, or Table I's."""
         return (self.slow or SpeedReduction()).d_max_m
@@ -98,15 +92,14 @@ PROFILES: dict[str, Profile] = {
         name="pretouch",
         perception=PerceptionParams(
             self_aside_m=0.005,
-            closing=ClosingSpeed(),
-            reckon_below_minimum=True,
-            place_at_stamp=True,
-            keep_while_silent=True,
+            memory=LocalMapParams(),
             outside=OutsidePoints(),
         ),
         task=TaskParams(mid_joint_projected=True),
         slow=None,
-        approach=BrakingCurve(effective_mass=EffectiveMass(), closing_deadband_m_s=0.05, tangential=Tangential()),
+        approach=BrakingCurve(
+            untouched_s=6.0, effective_mass=EffectiveMass(), closing_deadband_m_s=0.05, tangential=Tangential()
+        ),
         null_space=NullSpaceMotion(),
         window=WindowParams(freeze_while_reacting=True),
         detect=SequentialTest(touch=TouchSensorParams(), localise=LocalisationParams()),
@@ -124,11 +117,8 @@ docs/explanation/anticipation.md, docs/explanation/reaction.md)."""
 
 SHORT = {
     "paper-off": "paper:approach=none",
-    "pretouch-zones": "pretouch:perception.self_margin_m=0.09:perception.out_of_view_s=5:approach.margin_m=0.05"
-    ":approach.tangential.speed_m_s=0.04",
 }
-"""Short names of variants: `paper-off` of tables of results, `pretouch-zones` for skins of sensors with zones, which
-are noisier, see obstacles early and lose them again, and place them up to half a zone aside (docs/results/skins.md)."""
+"""Short names of variants in tables of results."""
 
 
 def profile_names() -> tuple[str, ...]:

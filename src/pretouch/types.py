@@ -32,6 +32,9 @@ from pretouch.values import IntArray as IntArray
 from pretouch.values import Number as Number
 from pretouch.values import value
 
+SEEN_NOW_S = 0.3
+"""Age of a look up to which its obstacle counts while a contact moves the arm [s]: as long as a unit may be silent."""
+
 
 class Obstacles(NamedTuple):
     """K sensed points, each with its closest point on the robot's body. Base frame."""
@@ -52,21 +55,30 @@ class Obstacles(NamedTuple):
     """(K,) signed distance from the body's surface, less the point's spread [m] (eqs. 5-7)."""
     closing_speed: Annotated[FloatArray, "K"]
     """(K,) estimated speed of the object itself towards the closest body point [m/s]; 0 where it is not estimated."""
+    slot: Annotated[IntArray, "K"]
+    """(K,) number that an obstacle keeps: of its unit, or where places are remembered of its link and rank."""
+    age: Annotated[FloatArray, "K"]
+    """(K,) time since the last look that showed it [s]."""
 
 
 @compiled
 def no_obstacles(count: int = 0) -> Obstacles:
     """Return no obstacles, with room for a number of them."""
     index, number, point = np.zeros(count, np.int64), np.zeros(count), np.zeros((count, 3))
-    return Obstacles(index, point, number, point.copy(), index.copy(), point.copy(), number.copy(), number.copy())
+    return Obstacles(
+        index, point, number, point.copy(), index.copy(), point.copy(), number.copy(), number.copy(), index.copy(),
+        number.copy(),
+    )  # fmt: skip
 
 
 @compiled
 def some_of(obstacles: Obstacles, first: int, end: int) -> Obstacles:
     """Return views of the obstacles from `first` to before `end`."""
-    unit, point, ee, on_body, link, direction, distance, closing = obstacles
+    unit, point, ee, on_body, link, direction, distance, closing, slot, age = obstacles
     m = slice(first, end)
-    return Obstacles(unit[m], point[m], ee[m], on_body[m], link[m], direction[m], distance[m], closing[m])
+    return Obstacles(
+        unit[m], point[m], ee[m], on_body[m], link[m], direction[m], distance[m], closing[m], slot[m], age[m]
+    )
 
 
 class Report(NamedTuple):

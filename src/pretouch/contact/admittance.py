@@ -42,7 +42,7 @@ from pretouch.modes import Event, ModeState
 from pretouch.params import AdmittanceParams, ClampParams
 from pretouch.robot.body import placed
 from pretouch.robot.kinematics import Kinematics, below
-from pretouch.types import FloatArray, Mode
+from pretouch.types import SEEN_NOW_S, FloatArray, Mode
 from pretouch.values import value
 
 Doing = Literal["task", "learn", "react", "soft", "still"]
@@ -140,8 +140,9 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         return "learn" if not armed else "soft" if mode.soft and self.soft_hold else "still"
 
     def _near(self, inputs: ReactionInputs) -> bool:
-        """Return whether an obstacle is near the body, or may be missed."""
-        return inputs.unseen or any(distance < self.near_m for distance in inputs.obstacles.body_distance.tolist())
+        """Return whether an obstacle is seen near the body, or may be missed."""
+        near = inputs.obstacles
+        return inputs.unseen or bool(((near.body_distance < self.near_m) & (near.age <= SEEN_NOW_S)).any())
 
     def _move_mass(self, clamp: ClampState, doing: Doing, body: Body, inputs: ReactionInputs) -> None:
         """Let the mass learn in free motion, and yield to the external torque in a reaction or a soft hold."""

@@ -47,7 +47,7 @@ class MotionRequest(NamedTuple):
     """Speed at which an arm that a contact moves may touch obstacles [m/s]; approaching ones then do not drive it
     away. NaN: the speed of the profile."""
     untouched: IntCell
-    """`Obstacles.unit` from which obstacles must not be touched at any speed."""
+    """`Obstacles.slot` from which obstacles must not be touched at any speed."""
 
 
 @value

@@ -1,10 +1,11 @@
 """The braking curve: the approach speed from which the arm can still stop, or touch gently.
 
 Along the normal the closing speed v, the object's own included, keeps v <= sqrt(v_c^2 + 2 a max(0, d - v tau - m)):
-the arm can brake at a to the touch speed v_c before it reaches the object, with a latency tau and a margin m. Each unit
-and link has a row G qd <= h for that. A row starts at the speed of the arm, tightens at one rate and loosens at
-another, also when its object is out of view; so no row changes the command by a step. The exception is an object so
-near that the arm could not slow down at that rate: there it brakes as hard as its joints may.
+the arm can brake at a to the touch speed v_c before it reaches the object, with a latency tau and a margin m. What was
+seen lately is not touched at all: there v_c is 0, and within the margin the arm goes back. Each obstacle has a slot
+with a row G qd <= h for that. A row starts at the speed of the arm, tightens at one rate and loosens at another, also
+when its object has gone; so no row changes the command by a step. The exception is an object so near that the arm could
+not slow down at that rate: there it brakes as hard as its joints may.
 """
 
 from typing import Annotated, NamedTuple
@@ -15,12 +16,17 @@ from pretouch.cholesky import factor, forward
 from pretouch.compiled import compiled, inlined, kernel
 from pretouch.control.approach import ConstraintRows
 from pretouch.params.pretouch import REGIONS, BrakingParams, EffectiveMass, Tangential
+from pretouch.records import zeros
 from pretouch.robot.kinematics import Chain, Kinematics, Mechanism, mass_matrix_into, row_along, tangents_of
 from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles
 
 _TANGENTS = 4  # two directions across the normal, both ways along each
-_MOST_ROWS = 2 + 2 * _TANGENTS
-"""Rows of a unit: of its obstacle and of one that fades, with those across the normal of each."""
+_MOST_ROWS = 1 + _TANGENTS
+"""Rows of a slot: along the normal and across it."""
+_AT_ONCE_M = 0.02
+"""Distance from the margin of an untouched object below which the limit holds at once [m]: the arm is slow there."""
+_BACK_1_S = 4.0
+"""Speed back to the margin of an untouched object for each metre within it [1/s]."""
 
 
 class TouchLimits(NamedTuple):
@@ -37,26 +43,23 @@ class TouchLimits(NamedTuple):
 
 
 class Slots(NamedTuple):
-    """Memory of the rows of K units: first a slot for each unit, then one for its row before."""
+    """Memory of the rows of S slots."""
 
-    link: Annotated[IntArray, "2 K"]
-    """(2 K,) link of the row, -1 for none."""
-    limit: Annotated[FloatArray, "2 K"]
-    """(2 K,) largest closing speed along the normal [m/s]."""
-    across: Annotated[FloatArray, "2 K"]
-    """(2 K,) largest speed across it [m/s]."""
-    normal: Annotated[FloatArray, "2 K", 3]
-    """(2 K, 3) from the body to the obstacle."""
-    point: Annotated[FloatArray, "2 K", 3]
-    """(2 K, 3) on the body [m]."""
+    link: Annotated[IntArray, "S"]
+    """(S,) link of the row, -1 for none."""
+    limit: Annotated[FloatArray, "S"]
+    """(S,) largest closing speed along the normal [m/s]."""
+    across: Annotated[FloatArray, "S"]
+    """(S,) largest speed across it [m/s]."""
+    normal: Annotated[FloatArray, "S", 3]
+    """(S, 3) from the body to the obstacle."""
+    point: Annotated[FloatArray, "S", 3]
+    """(S, 3) on the body [m]."""
 
 
-def slots_init(units: int) -> Slots:
-    """Return the slots of K units without a row."""
-    count = 2 * units
-    return Slots(
-        np.full(count, -1, np.int64), np.zeros(count), np.zeros(count), np.zeros((count, 3)), np.zeros((count, 3))
-    )
+def slots_init(count: int) -> Slots:
+    """Return slots without a row."""
+    return zeros(Slots, S=count)._replace(link=np.full(count, -1, np.int64))
 
 
 class BrakingNumbers(NamedTuple):
@@ -116,8 +119,9 @@ def inertia_factor(p: BrakingNumbers, kin: Kinematics, mechanism: Mechanism) -> 
 
 @inlined
 def braking_rows(
-    p: BrakingNumbers, slots: Slots, near: Obstacles, chain: Chain, L: FloatArray, touch: tuple[TouchLimits, float, int]
-) -> ConstraintRows:
+    p: BrakingNumbers, slots: Slots, near: Obstacles, chain: Chain, L: FloatArray, touch: tuple[TouchLimits, float],
+    untouched: tuple[int, float, float],
+) -> ConstraintRows:  # fmt: skip
     """Update `slots` by one period, and return rows.
 
     The first rows belong to the obstacles; then come the fading ones, then those across the normals.
@@ -128,35 +132,43 @@ def braking_rows(
         near: M obstacles.
         chain: joints that move the points.
         L: `inertia_factor`.
-        touch: limits of a touch, the closing speed of an object below which it counts as still [m/s], and the
-            `Obstacles.unit` from which obstacles must not be touched at any speed.
+        touch: limits of a touch, and the closing speed of an object below which it counts as still [m/s].
+        untouched: the `Obstacles.slot` from which obstacles must not be touched at any speed, the age of a look up to
+            which others must not, and the age from which they do not count [s].
     """
-    half, s, distance, (limits, deadband, untouched) = len(slots.link) // 2, p.curve, near.body_distance, touch
-    most, which, present, count = _MOST_ROWS * half, np.empty(half, np.int64), np.zeros(half, np.bool_), 0
+    places, s, distance, (limits, deadband) = len(slots.link), p.curve, near.body_distance, touch
+    most, which, present, count = _MOST_ROWS * places, np.empty(places, np.int64), np.zeros(places, np.bool_), 0
     rows = ConstraintRows(np.empty((most, len(chain.qd))), np.empty(most), which, s.slack_weight)
     for m in range(len(near.unit)):
-        k = near.unit[m]
-        if not distance[m] < s.d_notice_m:
-            continue  # counts as absent: the row of its unit fades below
+        k = near.slot[m]
+        if not (distance[m] < s.d_notice_m and near.age[m] < untouched[2]):
+            continue  # counts as absent: its row fades below
         present[k] = True
-        _take_slot(slots, k, half, near.link[m])
+        if slots.link[k] != near.link[m]:
+            # infinite, so that `_eased` starts at the speed of the arm
+            slots.link[k], slots.limit[k], slots.across[k] = near.link[m], np.inf, np.inf
         for i in range(3):
             slots.normal[k, i], slots.point[k, i] = near.direction[m, i], near.body_point[m, i]
         row = rows.G[count]
         approach = row_along(chain, slots.link[k], slots.point[k], near.direction[m], row)
         # the row is n^T J, which gives the effective mass along the normal too
         speed = touch_speed(mass_along(L, row), limits) if len(L) > 0 else limits.speed_max_m_s
-        if k >= untouched:
+        stops = k >= untouched[0] or near.age[m] < untouched[1]
+        if stops:
             speed = 0.0
         # a receding object allows no more; an infinite deadband ignores its speed
         own = max(0.0, near.closing_speed[m] - deadband)
         cap = braking_cap(distance[m], speed, s.deceleration_m_s2, s.latency_s, s.margin_m)
+        if stops and distance[m] < s.margin_m:
+            cap = _BACK_1_S * (distance[m] - s.margin_m)
         target = max(cap - own, -s.retreat_max_m_s)
         # the same curve at the rate of tightening: the arm can still slow down to it at that rate
         last = braking_cap(distance[m], speed, s.tighten_m_s2, s.latency_s, s.margin_m) - own
         # Faster than that, smoothness comes second: the limit falls at once. With 0.0 it falls as far as a stop, while
         # a retreat (target < 0) is still approached at the rate of tightening.
         slots.limit[k] = min(_eased(target, slots.limit[k], approach, p), max(target, last, 0.0))
+        if stops and distance[m] < s.margin_m + _AT_ONCE_M:
+            slots.limit[k] = target
         rows.h[count], which[count] = slots.limit[k], m
         across = np.inf
         if distance[m] < p.across.distance_m:
@@ -172,59 +184,26 @@ def braking_rows(
 
 
 @kernel
-def _take_slot(slots: Slots, k: int, half: int, link: int) -> None:
-    """Give slot k to a unit's row on a link: its present row, its row before another link was nearer, or a new one."""
-    if slots.link[k] == link:
-        return
-    last = half + k
-    # an object between two links may be nearer to each in turn: the exchange keeps the limits of both rows
-    if slots.link[last] == link:
-        slots.link[k], slots.link[last] = slots.link[last], slots.link[k]
-        slots.limit[k], slots.limit[last] = slots.limit[last], slots.limit[k]
-        slots.across[k], slots.across[last] = slots.across[last], slots.across[k]
-        for i in range(3):
-            slots.normal[k, i], slots.normal[last, i] = slots.normal[last, i], slots.normal[k, i]
-            slots.point[k, i], slots.point[last, i] = slots.point[last, i], slots.point[k, i]
-        return
-    _leave(slots, k, last)
-    # infinite, so that `_eased` starts at the speed of the arm
-    slots.link[k], slots.limit[k], slots.across[k] = link, np.inf, np.inf
-
-
-@kernel
-def _leave(slots: Slots, k: int, last: int) -> None:
-    """Let the row in slot k fade in slot `last`, unless a row that fades there is the tighter one."""
-    if slots.link[k] >= 0 and (slots.link[last] < 0 or slots.limit[k] <= slots.limit[last]):
-        slots.link[last], slots.limit[last], slots.across[last] = slots.link[k], slots.limit[k], slots.across[k]
-        for i in range(3):
-            slots.normal[last, i], slots.point[last, i] = slots.normal[k, i], slots.point[k, i]
-    slots.link[k] = -1
-
-
-@kernel
 def _fading_rows(
     p: BrakingNumbers, slots: Slots, present: BoolArray, chain: Chain, rows: ConstraintRows, count: int
 ) -> int:
-    """Add the rows of obstacles that are out of view; return the number of rows."""
-    half, s = len(slots.link) // 2, p.curve
-    for k in range(half):
-        if not present[k]:
-            _leave(slots, k, half + k)
-        last = half + k
-        if slots.link[last] < 0:
+    """Add the rows of obstacles that have gone; return the number of rows."""
+    s = p.curve
+    for k in range(len(slots.link)):
+        if present[k] or slots.link[k] < 0:
             continue
-        # The object is out of view: point and normal stay in the base frame while the link moves on. From stop to free
-        # that takes less than a second at the default rates.
-        slots.limit[last] += s.loosen_m_s2 * p.period_s
-        slots.across[last] += s.loosen_m_s2 * p.period_s
+        # Point and normal stay in the base frame while the link moves on. From stop to free that takes less than a
+        # second at the default rates.
+        slots.limit[k] += s.loosen_m_s2 * p.period_s
+        slots.across[k] += s.loosen_m_s2 * p.period_s
         # what the curve allows at d_notice, but for latency, margin and touch speed, or the task's speed if more
         free = max(p.fastest_m_s, np.sqrt(2.0 * s.deceleration_m_s2 * s.d_notice_m))
-        if slots.limit[last] >= free and slots.across[last] >= p.fastest_m_s:
-            slots.link[last] = -1
+        if slots.limit[k] >= free and slots.across[k] >= p.fastest_m_s:
+            slots.link[k] = -1
             continue
-        approach = row_along(chain, slots.link[last], slots.point[last], slots.normal[last], rows.G[count])
+        approach = row_along(chain, slots.link[k], slots.point[k], slots.normal[k], rows.G[count])
         # where the link is faster along the old normal, this slows it no harder than a row tightens
-        rows.h[count] = max(slots.limit[last], approach - s.tighten_m_s2 * p.period_s)
+        rows.h[count] = max(slots.limit[k], approach - s.tighten_m_s2 * p.period_s)
         count += 1
     return count
 

@@ -22,20 +22,37 @@ from pretouch.params.pretouch import TouchSensorParams as TouchSensorParams
 
 
 @dataclass(frozen=True)
-class ClosingSpeed(Checked):
-    """Estimate of the speed at which an object itself approaches."""
+class LocalMapParams(Checked):
+    """Memory of the places near the arm that were seen occupied (docs/explanation/anticipation.md)."""
 
-    memory_s: Positive = 0.09
-    """Time in which the weight of a reading falls by 1/e [s]: ours. A change of speed is followed to half in 0.14 s and
-    to nine tenths in 0.34 s; a range noise of 20 mm at 50 Hz leaves 0.05 m/s."""
+    cell_m: Positive = 0.02
+    """Edge of a cell, in which one place is remembered [m]; two and four times that for wider looks."""
+    fist_m: NonNegative = 0.04
+    """Radius of the ball behind a seen surface for which a place stands [m]: about half of a fist's width. A unit sees
+    one side of an object, and the arm may come from another."""
+    mark_m: Positive = 0.8
+    """Distance from a unit up to which its readings are remembered [m]: more than a restriction notices."""
+    carve_m: Positive = 0.6
+    """Distance from a unit up to which it sees a place empty [m]: farther away a zone may miss a fist."""
+    tolerance_m: NonNegative = 0.05
+    """Distance before a seen surface from which places are empty [m]: three times the noise, and half a footprint."""
+    looks: PositiveCount = 3
+    """Number of looks that count for a place: as many see it empty before it is forgotten. One look alone is
+    remembered for the age limit of its reading, like a point of the paper."""
+    kept_s: Positive = 12.0
+    """Life of a place that nothing has seen again [s]."""
+    per_link: PositiveCount = 6
+    """Number of obstacles for each moving link, in different directions from it."""
+    closing_s: Positive = 0.09
+    """Time in which the weight of a reading in the estimate of an object's own speed falls by 1/e [s]. A change of
+    speed is followed to half in 0.14 s and to nine tenths in 0.34 s; a range noise of 20 mm at 50 Hz leaves 0.05 m/s.
+    """
 
 
 @dataclass(frozen=True)
 class OutsidePoints(Checked):
     """Obstacle points of outside sources, such as cameras."""
 
-    per_link: PositiveCount = 2
-    """Number of points for each moving link, in different directions from it."""
     margin_m: NonNegative = 0.05
     """Distance from the arm or a fixture up to which a point belongs to it, plus its uncertainty [m]: 20 mm between
     links and their capsules, 15 mm of posture and latency, 15 mm of edges: ours."""
@@ -74,25 +91,17 @@ class PerceptionParams(Checked):
     silent_after_s: Positive = 0.3
     """Age of a unit's newest informative reading at which it counts as silent and the arm holds [s]."""
 
-    reckon_below_minimum: bool = False
-    """True: an obstacle below a sensor's minimum distance (40 mm) stays at its last position, not at 40 mm."""
-    place_at_stamp: bool = False
-    """True: a reading is placed from the pose of its unit at the measurement, by the joint velocities since, not from
-    the present pose: after 50 ms, late readings of an arm at 0.3 m/s are 15 mm wrong."""
-    keep_while_silent: bool = False
-    """True: a unit's last point stays until its next informative reading, or until the unit counts as silent: silence
-    is never free space. False: it ends after `persistence_s`."""
-    out_of_view_s: NonNegative = 0.0
-    """Life of a point that is out of its unit's beam by the motion of the arm, so that no reading can refute it [s]:
-    useful for sensors with zones (docs/results/skins.md). 0: the life of any other point."""
-    closing: ClosingSpeed | None = None
-    """Estimate of the objects' own closing speeds, `Obstacles.closing_speed`; none: no estimate."""
+    memory: LocalMapParams | None = None
+    """Memory of the places that units and outside sources have seen, each reading placed from the pose of its unit at
+    the measurement; none: each unit's last point alone, placed from its present pose."""
     outside: OutsidePoints | None = None
-    """Points of outside sources, such as cameras; none: they are ignored."""
+    """Points of outside sources, such as cameras, which are remembered; none: they are ignored."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         _check_order(self)
+        if self.outside is not None and self.memory is None:
+            raise ParameterError("PerceptionParams.outside is set without a memory: set memory, or outside to none.")
 
 
 def _check_order(params: PerceptionParams | OutsidePoints) -> None:

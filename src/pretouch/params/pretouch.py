@@ -236,6 +236,9 @@ class BrakingParams(Checked):
     touch_speed_max_m_s: Positive = 0.05
     """Largest touch speed v_c for any body region [m/s]: ours; a light arm would otherwise touch faster than in the
     experiments. Force against it: docs/explanation/anticipation.md."""
+    untouched_s: NonNegative = 0.0
+    """Age of a look up to which the arm does not touch what it showed while it moves by itself [s]: it stops at the
+    margin, and waits. Older places may be touched at the touch speed. 0: all, for a task that wants contact."""
     retreat_max_m_s: NonNegative = 0.1
     """Fastest retreat from an approaching object [m/s]: ours."""
     tighten_m_s2: Positive = 3.0

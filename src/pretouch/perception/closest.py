@@ -103,7 +103,9 @@ def beside(
     return Capsules(link, np.vstack([still.a, a]), np.vstack([still.b, b]), radius)
 
 
-def near_moving(moving: MovingFixtures, model: RobotModel, kin: Kinematics, now: float, first: int) -> Obstacles:
+def near_moving(
+    moving: MovingFixtures, model: RobotModel, kin: Kinematics, now: float, first: tuple[int, int]
+) -> Obstacles:
     """Return the point of the moving fixtures that is nearest to each moving link, one obstacle a link.
 
     Args:
@@ -111,7 +113,7 @@ def near_moving(moving: MovingFixtures, model: RobotModel, kin: Kinematics, now:
         model: the arm.
         kin: its posture.
         now: instant of the step [s].
-        first: `Obstacles.unit` of the first link; the others follow.
+        first: `Obstacles.unit` of all, and `slot` of the first link; the others follow.
     """
     (a, b), body, parts = moving.at(now), model.body, model.parts
     _, own_a, own_b, _ = placed(body, kin)
@@ -126,6 +128,9 @@ def near_moving(moving: MovingFixtures, model: RobotModel, kin: Kinematics, now:
     n = np.where(crossing, (0.0, 0.0, 1.0), between[c, m] / np.where(crossing, 1.0, apart[c, m][:, None]))
     share = (along[c, m] / np.where(length[m] > 0.0, length[m], 1.0))[:, None]
     velocity = moving.a_velocity[m] + share * (moving.b_velocity[m] - moving.a_velocity[m])
-    unit, far, closing = first + np.arange(len(parts)), np.full(len(parts), np.inf), -(n * velocity).sum(axis=1)
+    number = np.arange(len(parts))
+    unit, far, closing = np.full(len(parts), first[0]), np.full(len(parts), np.inf), -(n * velocity).sum(axis=1)
     point, body_point = on_other[c, m] - moving.radius[m, None] * n, on_body[c, m] + body.radius[c, None] * n
-    return Obstacles(unit, point, far, body_point, parts.copy(), n, gap[c, m], closing)
+    return Obstacles(
+        unit, point, far, body_point, parts.copy(), n, gap[c, m], closing, first[1] + number, np.zeros(len(parts))
+    )

@@ -1,25 +1,20 @@
-"""Points of outside sources, such as cameras: the choice of obstacles among them, and their life.
+"""Points of outside sources, such as cameras: which are remembered, and the silence of the sources.
 
-Of any number of points at most `per_link` stay for each moving link: the nearest one by its certain distance, then the
-nearest one in another direction, and so on. Each has a slot of its own, so a slot continues to show the same side of
-the same link, as a unit of the skin does. Points on the arm, in its posture at the measurement, and on fixtures are
-left out.
+Points on the arm, in its posture at the measurement, and on fixtures are left out.
 """
 
 import math
-from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled, inlined, kernel
+from pretouch.compiled import compiled, kernel
 from pretouch.params import OutsidePoints
-from pretouch.perception.closest import closest
-from pretouch.perception.motion_compensation import follow_points
-from pretouch.perception.obstacles import Sight, TrackState, speed_factor, track_init
-from pretouch.records import Cell
+from pretouch.perception.local_map import LocalMap, Look, index_of, remember
+from pretouch.perception.motion_compensation import FASTEST, JUMP_M
+from pretouch.perception.obstacles import Sight, speed_factor
 from pretouch.robot.body import Capsules, placed, to_axis
-from pretouch.robot.kinematics import Chain, Kinematics, dot, point_velocity
-from pretouch.types import FloatArray, IntArray, Obstacles, SeenPoints, no_obstacles
+from pretouch.robot.kinematics import Chain, Kinematics, dot, point_velocity, separation
+from pretouch.types import FloatArray, SeenPoints
 
 FARTHEST = 100.0
 """A coordinate [m] of this size is implausible: another unit, or a broken message."""
@@ -27,32 +22,16 @@ LARGEST_SIGMA = 1.0
 """A standard deviation [m] above this is implausible."""
 _ONE_INSTANT = 1e-3
 """Stamps that differ by less [s] count as one: in that time no arm moves by more than 2 mm."""
-_APART = 0.5
-"""Largest cosine between the directions of the points of one link: at least 60 degrees between them."""
-_UNKNOWN, _OBSTACLE, _EXPLAINED, _HIDDEN = range(4)
-
-
-class OutsideState(NamedTuple):
-    """Last points of outside sources in P slots: the same number for each moving link, one link after the other."""
-
-    tracks: TrackState
-    """`reading_stamp` is that of the measurement, `point_stamp` also that of a later set while the point is hidden."""
-    sigma: Annotated[FloatArray, "P"]
-    """(P,) standard deviation of each point [m]."""
-    source_stamp: Cell
-    """Stamp of the newest set [s]: -inf before the first, NaN without a source so far."""
-
-
-def outside_init(slots: int, source_stamp: float = math.nan) -> OutsideState:
-    """Return the state before the first points."""
-    return OutsideState(track_init(slots), np.zeros(slots), np.full(1, source_stamp))
+_FOOTPRINT = 0.2
+"""Half the width of a point's footprint as a part of its distance from the arm: near the arm cells are smallest."""
 
 
 def outside_silence(source_stamp: float, unfit: str, now: float, params: OutsidePoints | None) -> tuple[float, str]:
     """Return the factor in [0, 1] on the speed for outside sources that fall silent, and their fault.
 
     As with units, silence is no free space: from `slow_after_s` on the arm slows, and at `silent_after_s` it stands. It
-    stands at once for a fault `unfit` of the points. `source_stamp` [s] is that of `OutsideState`.
+    stands at once for a fault `unfit` of the points. `source_stamp` [s] is that of the newest set: -inf before the
+    first, NaN without a source so far.
     """
     if params is None:
         return 1.0, ""
@@ -87,148 +66,76 @@ def _is_point(stamp: float, point: FloatArray, m: int, sigma: float) -> bool:
     return bool(0.0 <= sigma <= LARGEST_SIGMA and np.isfinite(stamp))
 
 
-class _PointCandidates(NamedTuple):
-    """M points among which those of the slots are chosen."""
-
-    near: Obstacles
-    """Points with their closest body points; the spread of a point shortens its distance from the body."""
-    sigma: FloatArray
-    """(M,) [m]."""
-    stamp: FloatArray
-    """(M,) stamp of each measurement [s]."""
-    status: IntArray
-    """(M,) unknown, obstacle, explained by arm or fixture, or hidden by the arm."""
-    first: IntArray
-    """(M,) first slot of its nearest link."""
-
-
 @kernel
 def take_points(
-    sight: Sight, state: OutsideState, new: SeenPoints, posture: tuple[Kinematics, Chain],
+    sight: Sight, memory: tuple[LocalMap, FloatArray], new: SeenPoints, posture: tuple[Kinematics, Chain],
     instants: tuple[float, float], fixtures: Capsules,
 ) -> None:  # fmt: skip
-    """Choose the points of each link's slots.
+    """Remember the points of the sources that are neither on the arm nor on fixtures.
 
-    Points that the arm hides now compete with the new ones. A source returns the same set until it has a newer one:
-    each set is used once. A set that is newer than the step is ignored, as with units.
+    A source returns the same set until it has a newer one: each set is used once. A set that is newer than the step is
+    ignored, as with units.
 
     Args:
         sight: constants.
-        state: points so far, changed.
+        memory: places so far, and the stamp of the newest set of points (1,) [s], both changed.
         new: points of the sources.
         posture: of the arm.
         instants: those of the step and of the posture [s].
         fixtures: placed.
     """
-    (kin, chain), (now, posed), tracks = posture, instants, state.tracks
-    if np.isnan(state.source_stamp[0]):
-        state.source_stamp[0] = -np.inf
-    if not state.source_stamp[0] < new.heard <= now:
+    (places, source_stamp), (kin, chain), (now, posed), p = memory, posture, instants, sight.outside
+    if np.isnan(source_stamp[0]):
+        source_stamp[0] = -np.inf
+    if not source_stamp[0] < new.heard <= now:
         return
-    state.source_stamp[0] = new.heard
+    source_stamp[0], velocity, units = new.heard, np.zeros(3), len(sight.late)
+    for m in range(places.number[0]):
+        if places.unit[m] >= units:  # the source has answered: its silence keeps no point any more
+            places.until[m] = min(places.until[m], places.seen[m] + p.persistence_s)
     # the arm at the measurement of the points: it may have moved by more than the margin since; the whole arm explains
-    # points, the base too, while only moving links have slots
-    here = placed(sight.arm, kin)
+    # points, the base too, while only moving links have obstacles
+    here, moved_to = placed(sight.arm, kin), np.inf
     arm = Capsules(here.link, np.empty_like(here.a), np.empty_like(here.b), here.radius)
-    _move(here, chain, posed - new.heard, arm)
-    candidates = _candidates(sight, state, new, now, placed(sight.body, kin), arm)
-    chosen = np.full(len(state.sigma), -1, np.int64)
-    _choose(candidates, chosen, sight, (here, arm, fixtures), new.heard, chain, posed)
-
-    points, stamps = np.zeros((len(chosen), 3)), np.full(len(chosen), new.heard)
-    fresh = np.zeros(len(chosen), np.bool_)
-    for k in range(len(chosen)):
-        if chosen[k] >= 0:
-            m = chosen[k]
-            points[k], stamps[k] = candidates.near.point[m], candidates.stamp[m]
-            fresh[k] = candidates.status[m] == _OBSTACLE
-    if sight.memory_s > 0.0:
-        follow_points(tracks, points, stamps, fresh, sight.memory_s)
-    for k in range(len(chosen)):
-        tracks.report_stamp[k] = new.heard
-        if chosen[k] >= 0:
-            tracks.point[k], state.sigma[k], tracks.reading_stamp[k] = points[k], candidates.sigma[chosen[k]], stamps[k]
-            # the arm is in front of a hidden point, so the point counts as still there
-            tracks.point_stamp[k] = stamps[k] if fresh[k] else new.heard
-            if sight.memory_s > 0.0 and not fresh[k]:
-                tracks.motion[0, k], tracks.motion[1, k] = points[k], 0.0
-
-
-@inlined
-def _candidates(
-    sight: Sight, state: OutsideState, new: SeenPoints, now: float, body: Capsules, arm: Capsules
-) -> _PointCandidates:
-    """Return the points that the arm hides and the new ones that are young enough, each with its nearest link."""
-    p, sigmas, tracks = sight.outside, sight.perception.spread_sigmas, state.tracks
-    room, count = len(new.stamp) + len(state.sigma), 0
-    point, sigma, stamp, status = np.empty((room, 3)), np.empty(room), np.empty(room), np.full(room, _UNKNOWN)
-    for k in range(len(state.sigma)):
-        u = sigmas * state.sigma[k]
-        if now - tracks.reading_stamp[k] > p.hidden_s or now - tracks.point_stamp[k] > p.persistence_s:
-            continue
-        # within the margin of the arm no source can show the point; inside the arm it cannot be
-        if -u <= _gap(tracks.point, k, arm) <= p.margin_m + u:
-            point[count], sigma[count], stamp[count] = tracks.point[k], state.sigma[k], tracks.reading_stamp[k]
-            status[count] = _HIDDEN
-            count += 1
+    index = index_of(places, sight.memory.cell_m)
     for m in range(len(new.stamp)):
-        if _is_point(new.stamp[m], new.point, m, new.sigma[m]) and 0.0 <= now - new.stamp[m] <= p.persistence_s:
-            point[count], sigma[count], stamp[count] = new.point[m], new.sigma[m], new.stamp[m]
-            count += 1
-    near, first, links = no_obstacles(count), np.empty(count, np.int64), np.unique(body.link)
-    near.point[:] = point[:count]
-    near.direction[:, 2] = 1.0
-    closest(body, near)
-    for m in range(count):
-        near.body_distance[m] -= sigmas * sigma[m]
-        first[m] = p.per_link * np.searchsorted(links, near.link[m])
-    return _PointCandidates(near, sigma, stamp, status, first)
-
-
-@inlined
-def _choose(
-    candidates: _PointCandidates, chosen: IntArray, sight: Sight, capsules: tuple[Capsules, Capsules, Capsules],
-    placed_for: float, chain: Chain, posed: float,
-) -> None:  # fmt: skip
-    """Write the candidate of each slot to `chosen`: for each link the nearest, then the nearest apart from it.
-
-    A candidate is compared with arm and fixtures only when it would win: a cloud has hundreds that never do.
-    `capsules` are those of the arm now, of the arm at `placed_for`, which change with the stamp of the candidate, and
-    of fixtures.
-    """
-    here, arm, fixtures = capsules
-    near, status, p = candidates.near, candidates.status, sight.outside
-    for rank in range(p.per_link):
-        for m in range(len(near.unit)):
-            first = candidates.first[m]
-            best = chosen[first + rank]
-            if status[m] == _EXPLAINED or (best >= 0 and not near.body_distance[m] < near.body_distance[best]):
-                continue
-            if not _is_apart(near.direction, m, chosen[first : first + rank]):
-                continue
-            if status[m] == _UNKNOWN:
-                if not abs(candidates.stamp[m] - placed_for) < _ONE_INSTANT:
-                    placed_for = candidates.stamp[m]
-                    _move(here, chain, posed - placed_for, arm)
-                within = p.margin_m + sight.perception.spread_sigmas * candidates.sigma[m]
-                status[m] = _OBSTACLE
-                if (
-                    _gap(near.point, m, arm) <= within
-                    or _gap(near.point, m, fixtures) <= within
-                    or _on_planes(near.point, m, sight.planes, within)
-                ):
-                    status[m] = _EXPLAINED
-                    continue
-            chosen[first + rank] = m
+        stamp, sigma = new.stamp[m], new.sigma[m]
+        if not (_is_point(stamp, new.point, m, sigma) and 0.0 <= now - stamp <= p.persistence_s):
+            continue
+        if not abs(stamp - moved_to) < _ONE_INSTANT:
+            moved_to = stamp
+            _move(here, chain, posed - stamp, arm)
+        u = sight.perception.spread_sigmas * sigma
+        gap = _gap(new.point, m, arm)
+        if gap <= p.margin_m + u or gap > sight.memory.mark_m + u:
+            continue
+        if _gap(new.point, m, fixtures) <= p.margin_m + u or _on_planes(new.point, m, sight.planes, p.margin_m + u):
+            continue
+        # of the points in one cell the nearest to the arm is remembered: it has the least width
+        look = Look(stamp, (p.silent_after_s, p.silent_after_s), _FOOTPRINT * gap, u, units)
+        _follow(places, look, new.point[m], sight.memory.closing_s, velocity)
+        remember(places, index, new.point[m], velocity, look, sight.memory)
 
 
 @kernel
-def _is_apart(direction: FloatArray, m: int, chosen: IntArray) -> bool:
-    """Return whether point m has another direction from its link than all those chosen; false if one is missing."""
-    for c in chosen:  # noqa: SIM110  compiled code knows no generators
-        if c < 0 or c == m or dot(direction[c], direction[m]) > _APART:
-            return False
-    return True
+def _follow(places: LocalMap, look: Look, point: FloatArray, memory: float, velocity: FloatArray) -> None:
+    """Write the velocity (3,) [m/s] of an outside point (3,): that of the nearest earlier one, corrected by the move.
+
+    The correction is that of `follow_points`; a point without an earlier one nearby has velocity 0.
+    """
+    velocity[:], nearest, least = 0.0, -1, np.inf
+    for m in range(places.number[0]):
+        dt = look.stamp - places.seen[m]
+        if places.unit[m] >= look.unit and 0.0 < dt <= 3.0 * memory:
+            apart = separation(places.place, m, point)
+            if apart < least and apart < FASTEST * dt + JUMP_M:
+                nearest, least = m, apart
+    if nearest >= 0:
+        dt = look.stamp - places.seen[nearest]
+        gain = (1.0 - np.exp(-dt / memory)) ** 2 / dt
+        for i in range(3):
+            last = places.velocity[nearest, i]
+            velocity[i] = last + gain * (point[i] - places.place[nearest, i] - dt * last)
 
 
 @kernel

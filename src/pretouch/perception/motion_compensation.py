@@ -1,4 +1,4 @@
-"""Poses of the sensors at their measurements, and closing speeds of the objects themselves."""
+"""Poses of the sensors at their measurements, and the motion of the objects that they see."""
 
 import math
 
@@ -7,25 +7,25 @@ import numpy as np
 from pretouch.compiled import kernel
 from pretouch.perception.obstacles import TrackState
 from pretouch.robot.kinematics import Chain, point_velocity
-from pretouch.sensing.sensor import Cones, Sensors
-from pretouch.types import BoolArray, FloatArray, Obstacles
+from pretouch.sensing.sensor import Sensors
+from pretouch.types import BoolArray, FloatArray
 
 
 @kernel
 def move_back(
-    sensors: Sensors, moved: BoolArray, stamp: FloatArray, chain: Chain, posed: float, longest: float
+    sensors: Sensors, moved: BoolArray, stamp: FloatArray, chain: Chain, posed: float, longest: FloatArray
 ) -> None:
     """Move sensor poses, (K, 3) [m] and (K, 3, 3), from the instant of the arm's posture back to their stamps (K,) [s].
 
     That is the motion of their links at the joint velocities (n,) [rad/s], to first order in the position; the rotation
     is exact for a constant angular velocity. Only sensors with a flag `moved` (K,) change; `posed` is that of the
-    posture [s]. No reading counts as older than `longest` [s].
+    posture [s]. No reading counts as older than `longest` (K,) [s].
     """
     position, rotation, unit_link = sensors
     axis, moved_by, qd = chain.axis, chain.moved_by, chain.qd
     w, turned = np.empty(3), np.empty(3)
     for k in range(len(unit_link)):
-        age = min(posed - stamp[k], longest)
+        age = min(posed - stamp[k], longest[k])
         # measured after the posture: the further motion of the arm is unknown
         if not moved[k] or not age > 0.0:
             continue
@@ -56,9 +56,7 @@ def move_back(
 
 FASTEST = 2.0
 """Fastest plausible motion of a person's hand [m/s]."""
-_ON_ITS_OWN = 0.1
-"""Speed above which an object below a sensor's minimum distance counts as approaching by itself [m/s]."""
-_JUMP = 0.06
+JUMP_M = 0.06
 """Further difference of two readings of one surface, by noise and the width of the cone [m]."""
 
 
@@ -80,7 +78,7 @@ def follow_points(tracks: TrackState, points: FloatArray, stamp: FloatArray, cou
             away2 += (points[k, i] - last[k, i]) ** 2
         # not the first reading, whose dt is infinite, nor one after three memories: e^-3 of the old weight is left then
         continues = not np.isnan(motion[0, k, 0]) and 0.0 < dt <= 3.0 * memory
-        if not continues or away2 > (FASTEST * dt + _JUMP) ** 2:
+        if not continues or away2 > (FASTEST * dt + JUMP_M) ** 2:
             for i in range(3):
                 motion[0, k, i], motion[1, k, i] = points[k, i], 0.0
             continue
@@ -91,53 +89,3 @@ def follow_points(tracks: TrackState, points: FloatArray, stamp: FloatArray, cou
             error = points[k, i] - prediction
             motion[0, k, i] = prediction + (1.0 - theta * theta) * error
             motion[1, k, i] += (1.0 - theta) ** 2 / dt * error
-
-
-@kernel
-def reckon(
-    points: FloatArray, distance: FloatArray, stamp: FloatArray, tracks: TrackState, sensors: Sensors, cones: Cones,
-    within: float,
-) -> None:  # fmt: skip
-    """Extrapolate points (K, 3) below the sensor's minimum distance from their last positions.
-
-    A reading of the minimum distance `least` [m] says only that a target is between 0 and that. With a point of the
-    unit up to `within` [s] before, the new point is on the beam at the height of that one, moved on if it approached by
-    itself faster than 0.1 m/s; otherwise it is at the sensor. `stamp` (K,) [s] is that of the reading; the tracks still
-    contain the last points.
-    """
-    last, motion = tracks.point, tracks.motion
-    position, rotation = sensors.position, sensors.rotation
-    for k in range(len(distance)):
-        least = cones.range[cones.kind[k], 0]
-        # `measured` has raised smaller distances to that; NaN is skipped
-        if not distance[k] <= least:
-            continue
-        dt, ahead, nearing = stamp[k] - tracks.point_stamp[k], 0.0, 0.0
-        if 0.0 <= dt <= within:
-            for i in range(3):
-                # height of the last point along the beam as it is now, and speed of that point against the beam
-                ahead += rotation[k, i, 2] * (last[k, i] - position[k, i])
-                if not np.isnan(motion[1, k, i]):
-                    nearing -= rotation[k, i, 2] * motion[1, k, i]
-            # A smaller speed may be an error of the estimate for an object at rest: 2.5 % have a larger one
-            # (anticipation.md). The sensor's pose already contains the motion of the arm.
-            if nearing > _ON_ITS_OWN:
-                ahead -= dt * nearing
-        # the reading still holds: between the sensor and `least`
-        ahead = min(max(ahead, 0.0), least)
-        for i in range(3):
-            points[k, i] = position[k, i] + rotation[k, i, 2] * ahead
-
-
-@kernel
-def closing_speeds(motion: FloatArray, obstacles: Obstacles) -> None:
-    """Write the closing speed of each obstacle: its velocity, of the tracks' motion, against its direction.
-
-    It is 0 without an estimate, and never more than that of a person's hand.
-    """
-    for m in range(len(obstacles.unit)):
-        k, speed = obstacles.unit[m], 0.0
-        if not np.isnan(motion[0, k, 0]):
-            for i in range(3):
-                speed -= motion[1, k, i] * obstacles.direction[m, i]  # -v . u, u from the body to the object
-        obstacles.closing_speed[m] = min(max(speed, -FASTEST), FASTEST)

@@ -1,12 +1,11 @@
-"""Positions of sensed obstacles: eq. 1, the readings that count, the life and spread of a point, and silence."""
+"""Positions of sensed obstacles: eq. 1, the readings that count, the spread of a point, and silence."""
 
-import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from pretouch.compiled import compiled, kernel
-from pretouch.params import OutsidePoints, PerceptionParams
+from pretouch.params import LocalMapParams, OutsidePoints, PerceptionParams
 from pretouch.robot.body import Capsules
 from pretouch.robot.kinematics import Kinematics
 from pretouch.sensing.sensor import Cones, Sensors
@@ -23,8 +22,8 @@ class Sight(NamedTuple):
     """True if readings of the arm and of fixtures are left out."""
     margin_m: float
     """Distance before arm or fixture from which a reading belongs to it [m]."""
-    memory_s: float
-    """Memory of the estimated closing speeds [s], 0 without estimates."""
+    remembers: bool
+    """True if seen places are remembered; False: each unit's last point."""
     sigmas: float
     """Standard deviations of a unit's pose that shorten distances, 0 where all poses are exact."""
     arm: Capsules
@@ -34,7 +33,12 @@ class Sight(NamedTuple):
     planes: Annotated[FloatArray, "P", 4]
     """(P, 4) planes of fixtures."""
     skin: SkinArrays
+    late: Annotated[FloatArray, "K"]
+    """(K,) time by which readings of each unit may be older than `persistence_s` [s]."""
+    part: Annotated[IntArray, "L"]
+    """(L,) number of each link among those that joints move."""
     perception: PerceptionParams
+    memory: LocalMapParams
     outside: OutsidePoints
 
 
@@ -43,22 +47,22 @@ class TrackState(NamedTuple):
 
     point: Annotated[FloatArray, "K", 3]
     """(K, 3) obstacle position, base frame [m]."""
-    direction: Annotated[FloatArray, "K", 3]
-    """(K, 3) last direction from the body to the point."""
     point_stamp: Annotated[FloatArray, "K"]
     """(K,) stamp of the measurement of the point [s]."""
     reading_stamp: Annotated[FloatArray, "K"]
     """(K,) stamp of the newest reading that was used [s]."""
     report_stamp: Annotated[FloatArray, "K"]
     """(K,) stamp of the newest reading with information, see `is_informative` [s]."""
+    target_stamp: Annotated[FloatArray, "K"]
+    """(K,) stamp of the newest reading that showed a target [s]."""
     motion: Annotated[FloatArray, 2, "K", 3]
-    """(2, K, 3) smoothed position [m] and velocity [m/s] of each point, where closing speeds are estimated."""
+    """(2, K, 3) smoothed position [m] and velocity [m/s] of each point, where places are remembered."""
 
 
 def track_init(units: int) -> TrackState:
     """Return the state before any reading."""
-    nowhere, never = np.full((units, 3), np.nan), np.full(units, -np.inf)
-    return TrackState(nowhere, nowhere.copy(), never, never.copy(), never.copy(), np.full((2, units, 3), np.nan))
+    never, nowhere = np.full(units, -np.inf), np.full((2, units, 3), np.nan)
+    return TrackState(nowhere[0].copy(), never, never.copy(), never.copy(), never.copy(), nowhere)
 
 
 def points_of_units(obstacles: Obstacles, units: int) -> FloatArray:
@@ -149,13 +153,13 @@ def is_informative(distance: FloatArray, status: IntArray, target: FloatArray, c
 @kernel
 def update_tracks(
     tracks: TrackState, stamp: FloatArray, points: FloatArray, flags: tuple[BoolArray, BoolArray, BoolArray],
-    now: float, persistence: float,
+    target: FloatArray,
 ) -> None:  # fmt: skip
-    """Update the tracks by readings (K,) of `stamp` [s] with points (K, 3) [m].
+    """Update the tracks by readings (K,) of `stamp` [s] with points (K, 3) and the distances of targets (K,) [m].
 
-    `flags` (K,) mark readings that are fresh, that show an obstacle, and that are informative. A fresh reading with an
-    obstacle replaces its unit's point. One without, or a late one, does not change the point, so a single missed
-    reading removes no obstacle. From the age `persistence` [s] on, a point is dropped.
+    `flags` (K,) mark readings that are fresh, that show an obstacle and are young enough, and that are informative. A
+    reading with an obstacle replaces its unit's point. One without, or a late one, does not change the point, so a
+    single missed reading removes no obstacle.
     """
     fresh, shows, informative = flags
     for k in range(len(stamp)):
@@ -164,8 +168,9 @@ def update_tracks(
             tracks.reading_stamp[k] = stamp[k]
             if informative[k]:
                 tracks.report_stamp[k] = stamp[k]
-            # the point of a reading that is too old on arrival would be dropped in this very step
-            if shows[k] and now - stamp[k] <= persistence:
+            if not np.isnan(target[k]):
+                tracks.target_stamp[k] = stamp[k]
+            if shows[k]:
                 tracks.point_stamp[k] = stamp[k]
                 for i in range(3):
                     tracks.point[k, i] = points[k, i]
@@ -205,47 +210,6 @@ def silent_units(skin: Skin, report_stamp: FloatArray, status: IntArray, now: fl
     """
     silent = np.flatnonzero(now - report_stamp >= silent_after).tolist()
     return ", ".join(dict.fromkeys(skin.boards[k] + _FAILURES.get(int(status[k]), "") for k in silent))
-
-
-_ON_AXIS = math.cos(math.radians(0.5))
-"""Eq. 1 puts a target on the axis, though it may be anywhere in the cone: it may leave the cone as soon as the unit
-moves. Half a degree is more than an arm at rest turns."""
-
-
-@kernel
-def looks_at(kin: Kinematics, skin: SkinArrays, k: int, point: FloatArray) -> bool:
-    """Return whether the beam of unit k still points to a point (3,)."""
-    position, rotation, link = np.empty(3), np.empty((3, 3)), skin.link[k]
-    pose_into(kin.position[link], kin.rotation[link], skin.T_link_sensor[k], position, rotation)
-    return _on_axis(position, rotation, point) >= 0
-
-
-@kernel
-def drop_refuted(
-    tracks: TrackState, sensors: Sensors, informative: BoolArray, distance: FloatArray, until: float
-) -> None:
-    """Drop each point from before `until` [s] whose unit now sees through its position.
-
-    `informative` (K,) marks units with a new informative reading of `distance` (K,) [m], NaN without a target.
-    """
-    for k in range(len(informative)):
-        if informative[k] and tracks.point_stamp[k] < until:
-            away = _on_axis(sensors.position[k], sensors.rotation[k], tracks.point[k])
-            # a nearer target may hide the point: such a reading says nothing about it
-            if away >= 0 and not distance[k] < away:
-                tracks.point_stamp[k] = -np.inf
-
-
-@kernel
-def _on_axis(position: FloatArray, rotation: FloatArray, point: FloatArray) -> float:
-    """Return the distance [m] of a point (3,) on a sensor's axis; -1 for a point off the axis, or NaN."""
-    along, away2 = 0.0, 0.0
-    for i in range(3):
-        to = point[i] - position[i]
-        along += to * rotation[i, 2]
-        away2 += to * to
-    away = np.sqrt(away2)
-    return away if along >= _ON_AXIS * away else -1.0
 
 
 @kernel

@@ -6,19 +6,18 @@ import numpy as np
 
 from pretouch.compiled import inlined, kernel
 from pretouch.perception.closest import closest
-from pretouch.perception.external_points import OutsideState
-from pretouch.perception.motion_compensation import closing_speeds, follow_points, move_back, reckon
+from pretouch.perception.local_map import LocalMap, Look, carve, index_of, nearest_places, remember, replace_wider
+from pretouch.perception.motion_compensation import follow_points, move_back
 from pretouch.perception.obstacles import (
     Sight,
     TrackState,
     bring_nearer,
-    drop_refuted,
     is_informative,
     locate,
-    looks_at,
     measured,
     newer,
     pose_into,
+    spread,
     spread_of,
     update_tracks,
     widen,
@@ -26,7 +25,7 @@ from pretouch.perception.obstacles import (
 from pretouch.perception.scene_filter import leave_out, plane_return
 from pretouch.records import Cell, IntCell
 from pretouch.robot.body import Capsules, placed
-from pretouch.robot.kinematics import Chain, Kinematics
+from pretouch.robot.kinematics import Chain, Kinematics, separation
 from pretouch.sensing.sensor import Sensors
 from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles, some_of
 
@@ -57,21 +56,21 @@ class PerceivedScene(NamedTuple):
 
 @kernel
 def perceive(
-    sight: Sight, memory: tuple[TrackState, OutsideState], readings: Readings, scene: PerceivedScene,
+    sight: Sight, memory: tuple[TrackState, LocalMap], readings: Readings, scene: PerceivedScene,
     posture: tuple[Kinematics, Chain, FloatArray], instants: tuple[float, float], beside: Capsules,
 ) -> tuple[int, float, float]:  # fmt: skip
     """Locate obstacles (eq. 1), leave out the arm and fixtures, and compute the closest body points.
 
-    Updates the tracks; writes the obstacles, those of outside points last, and the distance of each reading's target
-    (K,) [m], NaN without one. An uncertain pose of a unit, or an uncertain point, shortens the distances by the spread
-    of the points, and lengthens the range in which arm and fixtures explain a reading.
+    Updates the memory; writes the obstacles, and the distance of each reading's target (K,) [m], NaN without one. An
+    uncertain pose of a unit, or an uncertain point, shortens the distances by the spread of the points, and lengthens
+    the range in which arm and fixtures explain a reading.
 
     `posture` includes the end-effector origin (3,) [m]; `instants` are those of the step and of the posture [s].
     Returns the number of obstacles, the distance of the nearest from the end-effector, and the last report of the unit
     that is silent for longest [s].
     """
     skin, p, room, distance = sight.skin, sight.perception, scene.near, scene.distance
-    (tracks, outside), (kin, _, ee), now = memory, posture, instants[0]
+    (tracks, places), (kin, _, ee), now = memory, posture, instants[0]
     distance[:] = measured(readings.distance, readings.status, skin.cones)
 
     # new readings: those of obstacles, and their points
@@ -80,89 +79,55 @@ def perceive(
         any_fresh = any_fresh or fresh[k]
     # a new reading costs the casting of cones: a step without one skips it
     if any_fresh:
-        _take_readings(sight, tracks, readings, scene, fresh, posture, instants, beside)
+        _take_readings(sight, memory, readings, scene, fresh, posture, instants, beside)
 
-    lives = _lives(tracks, p.persistence_s, p.silent_after_s if p.keep_while_silent else 0.0)
-    for k in range(len(lives)):
-        if p.out_of_view_s > lives[k] and not looks_at(kin, skin, k, tracks.point[k]):
-            lives[k] = p.out_of_view_s
-    body, estimates = placed(sight.body, kin), sight.memory_s > 0.0
-    units = _write_obstacles(tracks, lives, now, (body, ee), estimates, room)
-    for m in range(units):
-        if sight.sigmas > 0:
-            bring_nearer(room, m, spread_of(room.point[m], room.unit[m], sight.sigmas, skin, kin))
-    count = units
-    if outside.source_stamp[0] > -np.inf:  # false where there was no source
+    body = placed(sight.body, kin)
+    if sight.remembers:
         o = sight.outside
-        lives = _lives(outside.tracks, o.persistence_s, o.silent_after_s if p.keep_while_silent else 0.0)
-        rest = some_of(room, units, len(room.unit))
-        count += _write_obstacles(outside.tracks, lives, now, (body, ee), estimates, rest)
-        for m in range(units, count):
-            bring_nearer(room, m, p.spread_sigmas * outside.sigma[room.unit[m]])
-            room.unit[m] += len(distance)
+        outside = len(fresh), o.margin_m, (o.persistence_s, o.hidden_s)
+        count = nearest_places(places, (body, sight.part, ee), now, sight.memory, outside, room)
+    else:
+        count = _last_points(tracks, p.persistence_s + sight.late, now, (body, ee), room)
+        for m in range(count):
+            if sight.sigmas > 0:
+                bring_nearer(room, m, spread_of(room.point[m], room.unit[m], sight.sigmas, skin, kin))
     nearest, oldest = np.inf, np.inf
     for m in range(count):
         nearest = min(nearest, room.ee_distance[m])
     for k in range(len(distance)):
-        oldest = min(oldest, tracks.report_stamp[k])
+        oldest = min(oldest, tracks.report_stamp[k] + sight.late[k])
     return count, nearest, oldest
 
 
-@kernel
-def _lives(tracks: TrackState, persistence: float, silence: float) -> FloatArray:
-    """Return the time for which each point stays (K,) [s]."""
-    lives = np.full(len(tracks.point_stamp), persistence)
-    for k in range(len(lives)):
-        # no report since the point: silence is no free space, so the point stays longer
-        if tracks.report_stamp[k] <= tracks.point_stamp[k]:
-            lives[k] = max(persistence, silence)
-    return lives
-
-
-@kernel
-def _write_obstacles(
-    tracks: TrackState,
-    lives: FloatArray,
-    now: float,
-    arm: tuple[Capsules, FloatArray],
-    estimates: bool,
-    room: Obstacles,
+@inlined
+def _last_points(
+    tracks: TrackState, lives: FloatArray, now: float, arm: tuple[Capsules, FloatArray], room: Obstacles
 ) -> int:
-    """Write the obstacles of current points, and the closest points of the placed body; return their number.
+    """Write the obstacles of units' last points, while they live (K,) [s]; return their number.
 
-    The tracks store the directions. `lives` (K,) [s] is the time for which each point stays; `arm` is the body and the
-    end-effector origin (3,) [m].
+    `arm` is the body and the end-effector origin (3,) [m].
     """
     count, (body, ee) = 0, arm
     for k in range(len(lives)):
-        if now - tracks.point_stamp[k] <= lives[k]:
-            room.unit[count] = k
+        age = now - tracks.point_stamp[k]
+        if age <= lives[k]:
+            room.unit[count], room.slot[count], room.age[count], room.closing_speed[count] = k, k, age, 0.0
             for i in range(3):
-                room.point[count, i], room.direction[count, i] = tracks.point[k, i], tracks.direction[k, i]
-            if np.isnan(tracks.direction[k, 0]):  # an outside point; it matters only for one on a capsule's axis
-                room.direction[count, 0], room.direction[count, 1], room.direction[count, 2] = 0.0, 0.0, 1.0
+                room.point[count, i], room.direction[count, i] = tracks.point[k, i], 1.0 if i == 2 else 0.0
+            room.ee_distance[count] = separation(tracks.point, k, ee)
             count += 1
-    o = some_of(room, 0, count)
-    closest(body, o)
-    o.closing_speed[:] = 0.0
-    if estimates:
-        closing_speeds(tracks.motion, o)
-    for m in range(count):
-        x, y, z = o.point[m, 0] - ee[0], o.point[m, 1] - ee[1], o.point[m, 2] - ee[2]
-        o.ee_distance[m] = np.sqrt(x * x + y * y + z * z)
-        for i in range(3):
-            tracks.direction[o.unit[m], i] = o.direction[m, i]
+    closest(body, some_of(room, 0, count))
     return count
 
 
 @inlined
 def _take_readings(
-    sight: Sight, tracks: TrackState, readings: Readings, scene: PerceivedScene, fresh: BoolArray,
+    sight: Sight, memory: tuple[TrackState, LocalMap], readings: Readings, scene: PerceivedScene, fresh: BoolArray,
     posture: tuple[Kinematics, Chain, FloatArray], instants: tuple[float, float], beside: Capsules,
 ) -> None:  # fmt: skip
-    """Update the tracks by the new readings; those of the arm and of fixtures are no obstacles."""
+    """Update the memory by the new readings; those of the arm and of fixtures are no obstacles."""
     skin, p, distance, cones = sight.skin, sight.perception, scene.distance, sight.skin.cones
-    (kin, chain, _), (now, posed) = posture, instants
+    tracks, (kin, chain, _), (now, posed), stamp = memory[0], posture, instants, readings.stamp
     position, rotation = np.zeros((len(fresh), 3)), np.zeros((len(fresh), 3, 3))
     for k in range(len(fresh)):
         if fresh[k]:  # at 1 kHz one of twenty is
@@ -170,33 +135,63 @@ def _take_readings(
             pose_into(kin.position[m], kin.rotation[m], skin.T_link_sensor[k], position[k], rotation[k])
     sensors = Sensors(position, rotation, skin.link)
     informative = is_informative(readings.distance, readings.status, distance, cones)
-    shows = ~np.isnan(distance)
+    shows, lives = ~np.isnan(distance), p.persistence_s + sight.late
     # a return expected before `ends`, up to `margin_m` behind the reading, explains it: no beam passes a body
     ends = distance + sight.margin_m
     if sight.filters:
         if sight.sigmas > 0:
             widen(ends, sight.sigmas, skin, distance, sight.margin_m)
         leave_out(shows, fresh, distance, ends, p.self_aside_m, sensors, placed(sight.arm, kin), cones)
-    if p.place_at_stamp:
+    if sight.remembers:
         # fixtures stand still, and the units saw them from their past poses; the arm's links moved with the units.
         # This changes `position` and `rotation`, the arrays of `sensors`, for the rest of the function
-        move_back(sensors, fresh, readings.stamp, chain, posed, p.persistence_s)
+        move_back(sensors, fresh, stamp, chain, posed, lives)
     if sight.filters:
         leave_out(shows, fresh, distance, ends, p.self_aside_m, sensors, beside, cones)
         for k in range(len(fresh)):
             if fresh[k] and shows[k]:
                 shows[k] = plane_return(sensors, k, sight.planes, cones, ends[k]) > ends[k]
     points = locate(position, rotation, distance)  # eq. 1
-    # both use the last points, before `update_tracks` overwrites them
-    if p.reckon_below_minimum:
-        reckon(points, distance, readings.stamp, tracks, sensors, cones, 3 * p.persistence_s)
-    if sight.memory_s > 0.0:
-        counts = fresh & shows & (now - readings.stamp <= p.persistence_s)  # as in `update_tracks`
-        follow_points(tracks, points, readings.stamp, counts, sight.memory_s)
-    if p.out_of_view_s > 0:
-        drop_refuted(tracks, sensors, fresh & informative, distance, now - p.persistence_s)
     for k in range(len(fresh)):
-        if fresh[k] and shows[k] and np.isnan(tracks.direction[k, 0]):
-            # without a direction from the body yet, the beam of the unit
-            tracks.direction[k] = rotation[k, :, 2]
-    update_tracks(tracks, readings.stamp, points, (fresh, shows, informative), now, p.persistence_s)
+        # the point of a reading that is too old on arrival would be dropped in this very step
+        shows[k] = shows[k] and now - stamp[k] <= lives[k]
+    if sight.remembers:
+        # it uses the last points, before `update_tracks` overwrites them
+        follow_points(tracks, points, stamp, fresh & shows, sight.memory.closing_s)
+        young = fresh & informative & (now - stamp <= lives)
+        _remember_readings(sight, memory, stamp, distance, (young, shows), (sensors, points), lives)
+    update_tracks(tracks, stamp, points, (fresh, shows, informative), distance)
+
+
+@inlined
+def _remember_readings(
+    sight: Sight, memory: tuple[TrackState, LocalMap], stamp: FloatArray, distance: FloatArray,
+    flags: tuple[BoolArray, BoolArray], seen: tuple[Sensors, FloatArray], lives: FloatArray,
+) -> None:  # fmt: skip
+    """Remove the places that new readings (K,) show empty, and remember what they show.
+
+    `flags` (K,) mark new readings with information, and those of obstacles; `seen` are the poses of the sensors at
+    their measurements, and the points (K, 3) [m].
+    """
+    (tracks, places), (young, shows), (sensors, points), p = memory, flags, seen, sight.memory
+    cones, free, at = sight.skin.cones, np.full(len(stamp), -np.inf), np.empty(3)
+    for k in range(len(stamp)):
+        if young[k] and not np.isnan(distance[k]):
+            free[k] = distance[k] + p.fist_m - (p.tolerance_m if shows[k] else sight.margin_m)
+        elif young[k] and stamp[k] - tracks.target_stamp[k] > cones.timing[cones.kind[k], 0]:
+            # no target for longer than a burst of a sensor that misses one
+            free[k] = cones.range[cones.kind[k], 1]
+    carve(places, sensors, sight.skin.first, cones, free, p.carve_m)
+    index = index_of(places, p.cell_m)
+    for k in range(len(stamp)):
+        if not (young[k] and shows[k] and distance[k] <= p.mark_m):
+            continue
+        kind, velocity = cones.kind[k], np.zeros(3)
+        for i in range(3):
+            at[i] = points[k, i] + p.fist_m * sensors.rotation[k, i, 2]
+            velocity[i] = tracks.motion[1, k, i]
+        turned = np.sqrt(sight.skin.orientation_sigma[k] ** 2 + cones.spread[kind] ** 2)
+        u = spread(sight.sigmas, sight.skin.position_sigma[k], turned, distance[k])
+        width = distance[k] * cones.edge[kind, 2]
+        replace_wider(places, at, stamp[k], width)
+        remember(places, index, at, velocity, Look(stamp[k], (lives[k], p.kept_s), width, u, k), p)

@@ -212,6 +212,13 @@ def dot(a: FloatArray, b: FloatArray) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+@kernel
+def separation(points: FloatArray, m: int, other: FloatArray) -> float:
+    """Return the distance [m] of point m of (M, 3) from another point (3,)."""
+    x, y, z = points[m, 0] - other[0], points[m, 1] - other[1], points[m, 2] - other[2]
+    return np.sqrt(x * x + y * y + z * z)
+
+
 @compiled
 def tangents_of(normal: FloatArray, tangents: FloatArray) -> None:
     """Write two unit vectors (2, 3) across a unit vector (3,) and across each other."""

@@ -89,11 +89,8 @@ class Sensor(Part, group="pretouch.sensors"):
 
     @property
     def spread(self) -> float:
-        """Standard deviation of the direction of a target in its zone [rad].
-
-        0 for a single cone: eq. 1 assumes its target on the axis.
-        """
-        return 0.0 if self.zones == 1 else float(np.deg2rad(self.field_of_view_deg)) / self.zones / math.sqrt(12.0)
+        """Standard deviation of the direction of a target [rad]; 0: eq. 1 assumes it on the axis."""
+        return 0.0
 
     def looks(self) -> FloatArray:
         """Return the rotations (zones^2, 3, 3) from each zone's frame, z along its beam, to the sensor's.

@@ -54,6 +54,8 @@ class SkinArrays(NamedTuple):
     """(K,) standard deviation of its orientation [rad]."""
     cones: Cones
     """Field of view of each."""
+    first: Annotated[IntArray, "B + 1"]
+    """(B + 1,) first zone of each of the B mounted units, then K."""
 
 
 class Skin:
@@ -92,11 +94,14 @@ class Skin:
             np.array([u.position_sigma for u in self.units], dtype=np.float64),
             np.array([u.orientation_sigma for u in self.units], dtype=np.float64),
             cones_of([u.sensor for u in self.units]),
+            np.append(self.first, len(self.units)),
         )
         """The same for compiled code."""
-        self.link, self.T_link_sensor, position_sigma, orientation_sigma, self.cones = self.arrays
+        self.link, self.T_link_sensor, position_sigma, orientation_sigma, self.cones, _ = self.arrays
         self.exact = not (position_sigma.any() or orientation_sigma.any() or self.cones.spread.any())
         """True if the poses of all units are exact, and the directions of their targets."""
+        self.late: FloatArray = np.array([max(0.0, _age_s(u.sensor) - _age_s(PAPER_SENSOR)) for u in self.units])
+        """(K,) time by which readings of each may be older than those of the paper's sensor [s]."""
         self.T_link_board: FloatArray = np.array([u.T_link_sensor for u in self.mounted]).reshape(-1, 4, 4)[self.board]
         """(K, 4, 4) pose of the mounted unit of each: the IMU's."""
         self.touching: IntArray = np.array([k for k, u in enumerate(self.units) if u.touch is not None], dtype=np.int64)
@@ -104,6 +109,12 @@ class Skin:
 
     def __len__(self) -> int:
         return len(self.units)
+
+
+def _age_s(sensor: Sensor) -> float:
+    """Return the largest usual age of a sensor's newest reading [s]: its delay, and two missed readings."""
+    _, delay_s, period_s = sensor.timing
+    return delay_s + 3.0 * period_s
 
 
 def _check_place(unit: SensorUnit, model: RobotModel) -> None:

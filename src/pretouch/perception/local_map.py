@@ -1,0 +1,293 @@
+"""Places near the arm that were seen occupied, until they are seen empty or are too old.
+
+A reading says that something is at its distance, and that nothing is nearer along its beam: the first is remembered as
+a place, the second removes places. A place stands for a ball behind the surface that was seen, as large as a fist. It
+lasts from the second look on. Each cell has one place; a narrow look has smaller cells, and replaces wide ones.
+"""
+
+import math
+from typing import Annotated, NamedTuple
+
+import numpy as np
+
+from pretouch.compiled import inlined, kernel
+from pretouch.params import LocalMapParams
+from pretouch.perception.closest import closest
+from pretouch.perception.motion_compensation import FASTEST
+from pretouch.records import IntCell, zeros
+from pretouch.robot.body import Capsules
+from pretouch.robot.kinematics import dot, separation
+from pretouch.sensing.sensor import Cones, Sensors
+from pretouch.types import FloatArray, IntArray, Obstacles, no_obstacles, some_of
+
+MOST_PLACES = 1024
+"""Places that the map has room for; then the oldest go."""
+_BUCKETS = 1024
+_WIDE_M = 0.03
+"""Half a footprint [m] up to which a look has the smallest cells; up to twice that they are twice as large."""
+_APART = math.cos(math.radians(30.0))
+"""Largest cosine between the directions of two obstacles of one link."""
+_MOVING_S = 0.15
+"""Time after a look for which its object goes on with its speed [s]."""
+
+
+class LocalMap(NamedTuple):
+    """Remembered places, the first `number` of N. Base frame."""
+
+    number: IntCell
+    place: Annotated[FloatArray, "N", 3]
+    """(N, 3) centres of balls; of outside points, the points themselves [m]."""
+    velocity: Annotated[FloatArray, "N", 3]
+    """(N, 3) of the object at the last look [m/s]."""
+    seen: Annotated[FloatArray, "N"]
+    """(N,) stamp of the last look that showed it [s]."""
+    until: Annotated[FloatArray, "N"]
+    """(N,) instant until which it is remembered [s]."""
+    width: Annotated[FloatArray, "N"]
+    """(N,) half the width of the look's footprint [m]."""
+    spread: Annotated[FloatArray, "N"]
+    """(N,) uncertainty of the place [m]."""
+    looks: Annotated[IntArray, "N"]
+    """(N,) looks that count for it."""
+    unit: Annotated[IntArray, "N"]
+    """(N,) index of the unit that saw it last; outside points have the number of units."""
+
+
+def map_init(room: int) -> LocalMap:
+    """Return a map without places, with room for a number of them."""
+    return zeros(LocalMap, N=room)
+
+
+class Look(NamedTuple):
+    """What one reading shows of one place."""
+
+    stamp: float
+    """[s]"""
+    lasts: tuple[float, float]
+    """Life of a place after one look, and after several [s]."""
+    width: float
+    """Half the width of the footprint [m]."""
+    spread: float
+    """Uncertainty of the place [m]."""
+    unit: int
+    """See `LocalMap.unit`."""
+
+
+class CellIndex(NamedTuple):
+    """Places by their cells, while looks are taken: chains of places with the same hash."""
+
+    first: IntArray
+    """(B,) first place of each chain, -1 for none."""
+    following: IntArray
+    """(N,) the next place of the chain, -1 for none."""
+
+
+@kernel
+def _bucket(x: float, y: float, z: float, cell: float) -> int:
+    i, j, k = math.floor(x / cell), math.floor(y / cell), math.floor(z / cell)
+    return (i * 73856093 ^ j * 19349663 ^ k * 83492791) & (_BUCKETS - 1)
+
+
+@kernel
+def cell_of(width: float, smallest: float) -> float:
+    """Return the edge of the cells for a look of a width [m]."""
+    return smallest * (1.0 if width < _WIDE_M else 2.0 if width < 2.0 * _WIDE_M else 4.0)
+
+
+@kernel
+def index_of(places: LocalMap, smallest: float) -> CellIndex:
+    """Return the places by their cells."""
+    index = CellIndex(np.full(_BUCKETS, -1, np.int64), np.full(len(places.seen), -1, np.int64))
+    for m in range(places.number[0]):
+        _link(places, index, m, smallest)
+    return index
+
+
+@kernel
+def _link(places: LocalMap, index: CellIndex, m: int, smallest: float) -> None:
+    at = places.place[m]
+    b = _bucket(at[0], at[1], at[2], cell_of(places.width[m], smallest))
+    index.following[m], index.first[b] = index.first[b], m
+
+
+@kernel
+def remember(
+    places: LocalMap, index: CellIndex, at: FloatArray, velocity: FloatArray, look: Look, p: LocalMapParams
+) -> None:
+    """Add a look at a place (3,) [m] of an object with a velocity (3,) [m/s]."""
+    cell = cell_of(look.width, p.cell_m)
+    m = index.first[_bucket(at[0], at[1], at[2], cell)]
+    while m >= 0:
+        same = cell_of(places.width[m], p.cell_m) == cell
+        for i in range(3):
+            same = same and math.floor(places.place[m, i] / cell) == math.floor(at[i] / cell)
+        if same:
+            break
+        m = index.following[m]
+    if m < 0:
+        if places.number[0] == len(places.seen):
+            oldest = places.seen.argmin()
+            if places.seen[oldest] < look.stamp:  # it goes, and the next look finds room
+                places.looks[oldest], places.seen[oldest] = 0, np.inf
+            return
+        m = places.number[0]
+        places.number[0] += 1
+        places.looks[m], places.seen[m], places.width[m] = 0, -np.inf, look.width
+        for i in range(3):
+            places.place[m, i] = at[i]
+        _link(places, index, m, p.cell_m)
+    if not (look.stamp > places.seen[m] or look.width < places.width[m]):
+        return
+    if look.stamp > places.seen[m]:
+        places.looks[m] = min(p.looks, places.looks[m] + 1)
+    places.seen[m], places.width[m], places.spread[m] = look.stamp, look.width, look.spread
+    places.until[m], places.unit[m] = look.stamp + look.lasts[min(places.looks[m], 2) - 1], look.unit
+    for i in range(3):
+        places.place[m, i], places.velocity[m, i] = at[i], velocity[i]
+
+
+@kernel
+def replace_wider(places: LocalMap, at: FloatArray, stamp: float, width: float) -> None:
+    """Take a look off each place near `at` (3,) [m] that a clearly wider look saw earlier: it was seen here now."""
+    for m in range(places.number[0]):
+        wider = places.width[m] > 1.5 * width + 0.01 and places.seen[m] < stamp
+        if wider and separation(places.place, m, at) < min(places.width[m], 0.1) + _WIDE_M:
+            places.looks[m] = max(0, places.looks[m] - 1)
+
+
+@inlined
+def carve(places: LocalMap, sensors: Sensors, first: IntArray, cones: Cones, free: FloatArray, within: float) -> None:
+    """Take a look off each place that a unit sees empty.
+
+    Each place is looked up in the zone that looks at it. `first` (B + 1,) is the first zone of each mounted unit, and
+    the number of zones; `free` (K,) [m] is the distance up to which nothing is along the beam of each, -inf where
+    nothing is told; places beyond `within` [m] stay.
+    """
+    position, rotation = sensors.position, sensors.rotation
+    middle, to = np.empty(3), np.empty(3)
+    for b in range(len(first) - 1):
+        k0, k1, most = first[b], first[b + 1], -np.inf
+        middle[:] = 0.0
+        for k in range(k0, k1):
+            most = max(most, free[k])
+            for i in range(3):
+                middle[i] += rotation[k, i, 2]
+        if not most > 0.0:
+            continue
+        length = math.sqrt(dot(middle, middle))
+        # the edge of the whole field: of the outermost zone, and half of that zone
+        aside = 1.0
+        for k in range(k0, k1):
+            aside = min(aside, dot(middle, rotation[k, :, 2]) / length)
+        edge = cones.edge[cones.kind[k0]]
+        widest = aside * edge[0] - math.sqrt(max(0.0, 1.0 - aside * aside)) * edge[1]
+        for m in range(places.number[0]):
+            for i in range(3):
+                to[i] = places.place[m, i] - position[k0, i]
+            away = math.sqrt(dot(to, to))
+            if away > min(most, within) or dot(to, middle) < widest * length * away:
+                continue
+            best, at = -np.inf, k0
+            for k in range(k0, k1):
+                along = to[0] * rotation[k, 0, 2] + to[1] * rotation[k, 1, 2] + to[2] * rotation[k, 2, 2]
+                if along > best:
+                    best, at = along, k
+            if away < free[at] and best > edge[0] * away:
+                places.looks[m] = max(0, places.looks[m] - 1)
+
+
+@kernel
+def forget(places: LocalMap, now: float) -> None:
+    """Remove the places that are too old, or that were seen empty."""
+    m = 0
+    while m < places.number[0]:
+        if places.looks[m] > 0 and now <= places.until[m]:
+            m += 1
+            continue
+        last = places.number[0] - 1
+        for i in range(3):
+            places.place[m, i], places.velocity[m, i] = places.place[last, i], places.velocity[last, i]
+        places.seen[m], places.until[m], places.looks[m] = places.seen[last], places.until[last], places.looks[last]
+        places.width[m], places.spread[m], places.unit[m] = places.width[last], places.spread[last], places.unit[last]
+        places.number[0] = last
+
+
+@inlined
+def nearest_places(
+    places: LocalMap, arm: tuple[Capsules, IntArray, FloatArray], now: float, p: LocalMapParams,
+    outside: tuple[int, float, tuple[float, float]], room: Obstacles,
+) -> int:  # fmt: skip
+    """Write the obstacles: of each moving link the nearest place, then the nearest one in another direction, and so on.
+
+    Args:
+        places: remembered; where the arm itself comes to be, nothing is.
+        arm: placed capsules that joints move, the number (L,) of each link among those, and the end-effector origin
+            (3,) [m].
+        now: instant of the step [s].
+        p: parameters.
+        outside: of outside points: their unit, the distance from the body up to which no source can show one [m], and
+            their lives elsewhere and there [s].
+        room: for the obstacles.
+
+    Returns the number of obstacles.
+    """
+    forget(places, now)
+    count, (units, hidden_m, lives), (body, part, ee) = places.number[0], outside, arm
+    near, candidates, some = no_obstacles(count), np.empty(count, np.int64), 0
+    near.point[:] = places.place[:count]
+    near.direction[:, 2] = 1.0
+    closest(body, near)
+    distance = near.body_distance
+    for m in range(count):
+        if distance[m] < 0.0:
+            places.looks[m] = 0
+            continue
+        distance[m] -= places.spread[m]
+        if places.unit[m] < units:
+            distance[m] -= p.fist_m
+        elif distance[m] <= hidden_m:
+            places.until[m] = max(places.until[m], min(now + lives[0], places.seen[m] + lives[1]))
+        if distance[m] < p.mark_m:
+            candidates[some] = m
+            some += 1
+    chosen = np.full((part.max() + 1) * p.per_link, -1, np.int64)
+    for rank in range(p.per_link):
+        for m in candidates[:some]:
+            first = part[near.link[m]] * p.per_link
+            best = chosen[first + rank]
+            if best >= 0 and not distance[m] < distance[best]:
+                continue
+            if _is_apart(near.direction, m, chosen[first : first + rank]):
+                chosen[first + rank] = m
+    obstacles = 0
+    for slot in range(len(chosen)):
+        m = chosen[slot]
+        if m >= 0:
+            radius = p.fist_m if places.unit[m] < units else 0.0
+            _write(places, near, m, now, radius, some_of(room, obstacles, obstacles + 1))
+            room.ee_distance[obstacles] = max(0.0, separation(room.point, obstacles, ee) - places.spread[m])
+            room.slot[obstacles] = slot
+            obstacles += 1
+    return obstacles
+
+
+@kernel
+def _write(places: LocalMap, near: Obstacles, m: int, now: float, radius: float, room: Obstacles) -> None:
+    """Write place m, a ball of a radius [m], as the obstacle."""
+    room.unit[0], room.link[0], room.body_distance[0] = places.unit[m], near.link[m], near.body_distance[m]
+    room.age[0], speed = now - places.seen[m], 0.0
+    for i in range(3):
+        room.point[0, i] = near.point[m, i] - radius * near.direction[m, i]
+        room.body_point[0, i], room.direction[0, i] = near.body_point[m, i], near.direction[m, i]
+        speed -= places.velocity[m, i] * near.direction[m, i]  # -v . u, u from the body to the object
+    # never faster than a person's hand
+    room.closing_speed[0] = min(max(speed, -FASTEST), FASTEST) if room.age[0] <= _MOVING_S else 0.0
+
+
+@kernel
+def _is_apart(direction: FloatArray, m: int, chosen: IntArray) -> bool:
+    """Return whether place m has another direction from its link than all those chosen; false if one is missing."""
+    for c in chosen:  # noqa: SIM110  compiled code knows no generators
+        if c < 0 or c == m or dot(direction[c], direction[m]) > _APART:
+            return False
+    return True
