@@ -20,7 +20,7 @@ from pretouch.robot.kinematics import dot, separation
 from pretouch.sensing.sensor import Cones, Sensors
 from pretouch.types import FloatArray, IntArray, Obstacles, no_obstacles, some_of
 
-MOST_PLACES = 1024
+MOST_PLACES = 512
 """Places that the map has room for; then the oldest go."""
 _BUCKETS = 1024
 _WIDE_M = 0.03
