@@ -11,6 +11,7 @@ from pretouch.errors import ParameterError
 from pretouch.sensing.sensor import Capacitive, Sensor, cone_rays
 from pretouch.sensing.skin import Skin
 from pretouch.sim.capacitive import STREAM, Electrode
+from pretouch.sim.flaws import flaw_arrays, flaws_of
 from pretouch.sim.plant import ArmInWorld
 from pretouch.sim.rays import Finders, Ranging, deliver, geoms_of, measure
 from pretouch.sim.under_way import ROUNDING_S
@@ -21,6 +22,9 @@ from pretouch.types import FloatArray, RangeReadings, RangeStatus
 class RangeFinderParams(Checked):
     """Errors of a skin's sensors."""
 
+    realistic: bool = False
+    """True if each type errs as recordings of real ones show (`sim.flaws`), in place of a kinder sensor that only has
+    noise and a constant error: bursts and losses of "no target", delays by zone, offsets, false statuses."""
     mode: Literal["short", "long"] = "short"
     """Distance mode."""
     rate_hz: NonNegative = 0.0
@@ -66,7 +70,7 @@ class RangeSample(NamedTuple):
     unit: int
     """Index of the unit in the skin."""
     time: float
-    """Time of the measurement [s]."""
+    """Time of the measurement [s], as the unit stamps it."""
     distance: float
     """[m]; 0 without a target."""
     status: int
@@ -104,14 +108,17 @@ class RangeFinders:
         cones = np.array([cone_rays(params.rings, unit.sensor.angle) for unit in skin.units]).reshape(count, rays, 3)
         self._rng = np.random.default_rng([seed, 3])
         self._send, self._light = send, np.random.default_rng([seed, 4])
-        offset = params.offset_max_m * self._rng.uniform(-1, 1, count)
+        flaws = [flaws_of(unit.sensor) if params.realistic else None for unit in skin.units]
+        offset = np.array([one.offset_max_m if one else params.offset_max_m for one in flaws])
+        offset *= self._rng.uniform(-1, 1, count)
         bodies, geoms = plant.first_body + skin.link, geoms_of(plant.mj_model, data)
         # a flat wall square to the beam is read at its distance, as by a calibrated sensor: rays at an angle meet it
         # farther away by 1 / cos, and with strength cos^3, which is slant, and the distance squared
         flat_wall = (cones[:, :, 2] ** 3).sum(axis=1) / (cones[:, :, 2] ** 2).sum(axis=1)
         kinds = np.empty((count, 3))
-        for k, sensor in enumerate(unit.sensor for unit in skin.units):
-            kinds[k] = sensor.ranging(params.mode).distance_max_m, sensor.nearest_m, sensor.noise
+        for k, (sensor, own) in enumerate(zip((unit.sensor for unit in skin.units), flaws, strict=True)):
+            farthest = sensor.farthest_m if own and own.seen_m else sensor.ranging(params.mode).distance_max_m
+            kinds[k] = farthest, sensor.nearest_m, sensor.noise
         finders = Finders(
             data.xpos, data.xmat, bodies, skin.T_link_sensor, cones, np.column_stack([offset, flat_wall, kinds])
         )
@@ -125,6 +132,7 @@ class RangeFinders:
         self._ranging = Ranging(
             p=params.numbers,
             finders=finders,
+            flaws=flaw_arrays([unit.sensor for unit in skin.mounted], params.realistic, params.reflectance_limit),
             geoms=geoms,
             first=np.append(skin.first, count),
             period=period,
@@ -147,7 +155,7 @@ class RangeFinders:
 
     def change(self, params: RangeFinderParams) -> None:
         """Err in another way from the next measurement on; what was settled when they were mounted has to stay."""
-        for name in ("mode", "rings", "offset_max_m"):
+        for name in ("mode", "rings", "offset_max_m", "realistic"):
             if getattr(params, name) != getattr(self.params, name):
                 raise ParameterError(
                     f"RangeFinderParams.{name} cannot change while the sensors run: create them again."
@@ -182,8 +190,8 @@ class RangeFinders:
             if unit in self._electrodes:
                 row[3:7] = self._electrodes[unit].measure(time, float(row[7]))
             if self._send and unit not in self.silenced:
-                distance, status, sigma, strength = row[3:7].tolist()
-                self._send(RangeSample(unit, time, distance, int(status), sigma, *_light(strength, self._light)))
+                stamp, _, distance, status, sigma, strength = row[1:7].tolist()
+                self._send(RangeSample(unit, stamp, distance, int(status), sigma, *_light(strength, self._light)))
         if self._send:
             ranging.rows[0] = first
         return until

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from pretouch.compiled import compiled, entry, kernel
+from pretouch.sim.flaws import ARRIVAL, BLACK, NEXT, PART, PART_S, STAMP, FlawArrays, begin_frame, flawed
 from pretouch.sim.mujoco_calls import mj_rayHfield, mj_rayMesh, mju_rayGeom
 from pretouch.types import BoolArray, FloatArray, IntArray, RangeStatus
 
@@ -133,6 +134,7 @@ class Ranging(NamedTuple):
 
     p: Any  # numbers of `RangeFinderParams`
     finders: Finders
+    flaws: FlawArrays
     geoms: Geoms
     first: IntArray  # (B + 1,) first sensor of each unit, and K
     period: FloatArray  # (B,) [s]
@@ -154,24 +156,34 @@ def measure(time: float, ranging: Ranging, rng: np.random.Generator) -> float:
 
     There has to be room for a row of each sensor.
     """
-    p, due, rows = ranging.p, ranging.due, ranging.rows
+    p, due, rows, flaws = ranging.p, ranging.due, ranging.rows, ranging.flaws
     for unit in range(len(due)):
         if due[unit] > time:
             continue
-        due[unit] += ranging.period[unit] * (1.0 + p.period_jitter * rng.standard_normal())
         first, last = ranging.first[unit], ranging.first[unit + 1]
+        own, part, period = flaws.course[unit], flaws.course[unit, PART], ranging.period[unit]
+        if part == 0.0:
+            own[NEXT] = due[unit] + period * (1.0 + p.period_jitter * rng.standard_normal())
         draws = np.empty(last - first)
         for i in range(len(draws)):
             draws[i] = rng.standard_normal()
-        arrival = time + p.latency_s + rng.exponential(p.jitter_s)
-        if rng.random() < p.dropout:
-            arrival = np.inf
+        parts, until_stamp, delay, _ = flaws.of_unit[unit]
+        if part == 0.0:
+            own[STAMP] = time + until_stamp
+            own[ARRIVAL] = own[STAMP] + delay + p.latency_s + rng.exponential(p.jitter_s)
+            if rng.random() < p.dropout:
+                own[ARRIVAL] = np.inf
+            if flaws.kind[first] >= 0:
+                begin_frame(unit, flaws.kind[first], period, flaws, rng)
+        own[PART] = (part + 1.0) % parts
+        due[unit] = own[NEXT] if own[PART] == 0.0 else due[unit] + PART_S
         for k in range(first, last):
-            if ranging.whole or (arrival < np.inf and not ranging.silent[k]):
+            if flaws.part[k] == part and (ranging.whole or (own[ARRIVAL] < np.inf and not ranging.silent[k])):
                 row = ranging.sent[rows[0]]
                 rows[0] += 1
-                row[0], row[1], row[2], row[7] = k, time, np.inf if ranging.silent[k] else arrival, draws[k - first]
-                row[3], row[4], row[5], row[6] = _measured(k, row[7], p, ranging.finders, ranging.geoms)
+                row[0], row[1], row[7] = k, own[STAMP], draws[k - first]
+                row[2] = np.inf if ranging.silent[k] else own[ARRIVAL]
+                row[3], row[4], row[5], row[6] = _measured(k, row[7], ranging, own, rng)
     return due.min() if len(due) else np.inf
 
 
@@ -193,18 +205,27 @@ def deliver(
 
 
 @kernel
-def _measured(unit: int, draw: float, p: Any, finders: Finders, geoms: Geoms) -> tuple[float, int, float, float]:
+def _measured(
+    k: int, draw: float, ranging: Ranging, own: FloatArray, rng: np.random.Generator
+) -> tuple[float, int, float, float]:
     """Measure with a sensor; `draw` is normal. Return distance [m], status, standard deviation [m], and strength.
 
     The nearest group of returns strong enough to be detected is reported. Strength falls with the square of the
     distance and the cosine of incidence. It is relative to a target that is just detected: one that fills the cone, at
     `distance_max`, square to the beam, of `reflectance_limit`, has 1 in all.
     """
-    link, figures = finders.link[unit], finders.figures[unit]
-    offset, calibration, distance_max, noise = figures[0], figures[1], figures[2], figures[4]
-    origin, R = placed(finders.position[link], finders.rotation[link], finders.T_link_sensor[unit])
-    rays = turned(R, finders.cone[unit])
-    distance, normal, _ = cast(origin, rays, geoms, link, distance_max)
+    p, finders, flaws = ranging.p, ranging.finders, ranging.flaws
+    link, figures = finders.link[k], finders.figures[k]
+    offset, calibration, distance_max, nearest_m, noise = figures[0], figures[1], figures[2], figures[3], figures[4]
+    floor, rate, grey, least = p.noise_floor_m, p.noise_rate, distance_max, 1.0
+    if flaws.kind[k] >= 0:
+        floor, rate, softness = flaws.of_sensor[k, 0], flaws.of_sensor[k, 1], flaws.of_sensor[k, 3]
+        if softness > 0.0:
+            chance = rng.random()
+            grey, least = flaws.of_sensor[k, 2], (chance / (1.0 - chance)) ** softness
+    origin, R = placed(finders.position[link], finders.rotation[link], finders.T_link_sensor[k])
+    rays = turned(R, finders.cone[k])
+    distance, normal, _ = cast(origin, rays, ranging.geoms, link, distance_max)
     brightness, count = p.reflectance / p.reflectance_limit, len(distance)
     strength = np.zeros(count)
     for i in range(count):
@@ -216,27 +237,30 @@ def _measured(unit: int, draw: float, p: Any, finders: Finders, geoms: Geoms) ->
                 distance[i] = 0.0
             if p.slant_power != 1.0:
                 slant = slant**p.slant_power
-            ratio = distance_max / max(distance[i], 0.01)  # 10 mm: no return is infinitely strong
+            ratio = grey / max(distance[i], 0.01)  # 10 mm: no return is infinitely strong
             strength[i] = brightness * slant * ratio * ratio / count
-    total, mean = _nearest_group(distance, strength, p.merge_m)
+    total, mean = _nearest_group(distance, strength, p.merge_m, least)
+    if flaws.kind[k] >= 0 and p.reflectance <= BLACK and sum(strength) > 0.0:
+        return 0.022 + 0.005 * rng.random(), _OK, floor, sum(strength)
     if total == 0.0:
         return 0.0, _SIGNAL, 0.0, sum(strength)
     mean *= calibration / total
     # shot noise: with a share of the light that a target filling the cone would return, 1 / sqrt(share) times the noise
-    full = brightness * (distance_max / max(mean, 0.01)) ** 2
-    sigma = p.noise_floor_m + p.noise_rate * mean * np.sqrt(max(1.0, full / total))
+    full = brightness * (grey / max(mean, 0.01)) ** 2
+    sigma = floor + rate * mean * np.sqrt(max(1.0, full / total))
     trusted = sigma <= p.sigma_limit_m
     sigma *= noise
     measured = max(0.0, mean + offset + sigma * draw)
     if not trusted:
         return measured, _SIGMA, sigma, total
-    if measured < figures[3]:
-        return measured, _MIN_RANGE, sigma, total
-    return measured, _OK, sigma, total
+    if flaws.kind[k] >= 0:
+        measured, status = flawed(k, measured, own, flaws, rng)
+        return measured, status, sigma if status == _OK else 0.0, total
+    return measured, _MIN_RANGE if measured < nearest_m else _OK, sigma, total
 
 
 @kernel
-def _nearest_group(distance: FloatArray, strength: FloatArray, merge_m: float) -> tuple[float, float]:
+def _nearest_group(distance: FloatArray, strength: FloatArray, merge_m: float, least: float) -> tuple[float, float]:
     """Strength of the nearest group of returns that is detected, and the sum of strength times distance; or zeros.
 
     A weak group hides nothing that is behind it.
@@ -254,6 +278,6 @@ def _nearest_group(distance: FloatArray, strength: FloatArray, merge_m: float) -
             if nearest <= distance[i] <= nearest + merge_m:
                 total += strength[i]
                 mean += strength[i] * distance[i]
-        if total >= 1.0:
+        if total >= least:
             return total, mean
         start = nearest + merge_m

@@ -164,6 +164,9 @@ class Fleet:
             return hand_on
 
         finders = RangeFinders(plant, skin, ranging or RangeFinderParams(), self.seed, handed_to(self.take_range))
+        if finders.params.realistic:
+            for unit, mounted in zip(self.units, skin.mounted, strict=True):
+                unit.delay_s = mounted.sensor.timing[1]
         if len(skin.touching):
             TouchSensors(plant, skin, TouchErrors(), self.seed, laid, handed_to(self.take_touch))
         if self._params.imu is not None:

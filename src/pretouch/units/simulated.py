@@ -8,6 +8,7 @@ from math import isclose
 import numpy as np
 
 from pretouch.checks import Checked, NonNegative, Positive
+from pretouch.sensing.sensor import PAPER_SENSOR
 from pretouch.sensing.unit import ACCELERATION_LSB, ANGULAR_RATE_LSB
 from pretouch.sim.imu import ImuParams, ImuSample
 from pretouch.sim.range_finder import RangeSample
@@ -56,9 +57,8 @@ class UnitParams(Checked):
     """Least time from one sample to the next; past it, one is sent as soon as there is a new range [s] (firmware)."""
     longest_s: Positive = 0.025
     """Time from one sample to the next while there is no new range [s] (firmware)."""
-    ready_s: NonNegative = 0.01
-    """Time from the middle of a measurement until the unit has it [s]: half the budget of 15 ms, bus, loop
-    (firmware's tests: 9 to 12 ms)."""
+    ready_s: NonNegative = 0.0025
+    """Time until the unit has a measurement that is ready [s]: bus and loop (firmware's tests: 1.5 to 4.5 ms)."""
     boot_s: NonNegative = 2.0
     """Time from a reset to the first hello [s]: start of the firmware and joining the network; an assumption."""
     drift_ppm: NonNegative = 20.0
@@ -96,6 +96,8 @@ class SimulatedUnit:
         self._imu_scale, self._imu_rate = (0, 0) if imu is None else (_scale(imu), round(imu.rate_hz))
         self.silent = False
         """True if it neither sends nor hears: out of power, or out of reach."""
+        self.delay_s = PAPER_SENSOR.delay_s
+        """Time from the middle of a measurement, or its stamp, until it is ready [s]."""
         self.stuck = False
         """True if its range finder repeats what it measured last."""
         self._forget()
@@ -132,7 +134,7 @@ class SimulatedUnit:
         self._forget()
 
     def take_range(self, sample: RangeSample, zone: int = 0) -> None:
-        """Let its range finder measure, with a zone of it; it has the reading `UnitParams.ready_s` later.
+        """Let its range finder measure, with a zone of it; it has the reading `delay_s` and `UnitParams.ready_s` later.
 
         What zones measure at one time is one reading. A zone that measures nothing then has status NONE.
         """
@@ -165,7 +167,8 @@ class SimulatedUnit:
 
     def _look_at_range(self, now: float) -> None:
         """Take the readings that are ready."""
-        while self._measuring and self._measuring[0][0].time + self._params.ready_s <= now + _ROUNDING_S:
+        late = self.delay_s + self._params.ready_s
+        while self._measuring and self._measuring[0][0].time + late <= now + _ROUNDING_S:
             ready = self._measuring.popleft()
             self._range_new = True
             if self.stuck and self._range:
