@@ -118,7 +118,7 @@ def setting(scenario: Scenario, profile: Profile, seed: int, name: str = PANDA) 
         path=path,
         seed=seed,
         plant=plant_of(params.get("plant", {}), plant_params_of(model.description)),
-        ranging=RangeFinderParams(**params.get("ranging", {})),
+        ranging=RangeFinderParams(realistic=True, **params.get("ranging", {})),
         **scene,
     )
     after, length = params.get("after_contact_s", np.inf), params.get("turns", np.inf) * path.length

@@ -1,6 +1,6 @@
 """Paper IV-B: a person holds a hand beside the circle or in it, on one side and then on the other."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -83,7 +83,8 @@ def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row and its record."""
     where = context.placement
     person = Visitor(context.model, visits(cell["place"], seed, where))
-    setup = context.setup(cell, seed, SceneSpec(hand=HandSpec()), where.path("circle", -1.0), hand=person)
+    scene, path, sensors = SceneSpec(hand=HandSpec()), where.path("circle", -1.0), replace(context.ranging, realistic=True)
+    setup = context.setup(cell, seed, scene, path, hand=person, ranging=sensors)
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
     steps = record.steps
     off = [float(np.linalg.norm(s.ee_position - s.path_position)) for s in steps]
