@@ -152,13 +152,13 @@ class RangeFinder(Watched):
             self._start(self._device.recalibrate)
 
     def _take(self, now):
-        """Store the measurement. It ended after the last look that found none.
+        """Store the measurement. It became ready after the last look that found none.
 
         The next cannot end sooner than most of a period after this one, which bounds its age even if nobody looks.
         """
         device = self._device
         self._stream = device.stream
-        self._middle = self._clock.add(self._empty, -device.budget_us // 2)
+        self._middle = self._clock.add(self._empty, -device.delay_us)
         self._next = self._clock.add(self._empty, device.period_us * 9 // 10)
         self._empty = self._next if self._clock.diff(self._next, now) > 0 else now
         self._fresh = now

@@ -79,7 +79,9 @@ class VL53L1X:
     """One sensor on an I2C bus. `begin` makes it range; then, each cycle: `if sensor.ready(): sensor.read()`."""
 
     budget_us = 1000 * _BUDGET_MS
-    """How long a measurement integrates [us]: its middle lies half of this before it is ready."""
+    """How long a measurement integrates [us]."""
+    delay_us = budget_us // 2
+    """From the middle of a measurement until it is ready [us]."""
     period_us = 1000 * _PERIOD_MS
     """From the start of a measurement to that of the next [us]."""
 

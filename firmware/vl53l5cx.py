@@ -21,6 +21,7 @@ _DSS, _ZONES, _RATE, _MODE, _ORDER = const(0xAD38), const(0x5450), const(0x5458)
 _SINGLE, _SIZE_TOLD = const(0xD964), const(0x5440)
 _OUT_LIST, _OUT_SIZE, _OUT_ENABLE = const(0xD980), const(0xD968), const(0xD970)
 _FASTEST_HZ = {4: 60, 8: 15}
+_DELAY_US = {4: 34_000, 8: 59_000}  # as `timing` of the package's type VL53L5CX, which says where it is from
 
 _AMBIENT, _TARGETS, _SIGMA, _DISTANCE, _TARGET_STATUS = (
     const(0x54D0), const(0xDB84), const(0xDEC4), const(0xDF44), const(0xE084),
@@ -61,8 +62,8 @@ class VL53L5CX:
         self.zones = bytearray(2 + 5 * side * side)
         """The newest measurement as it stands in a sample (`wire`)."""
         self.zones[0] = side
-        self.period_us = self.budget_us = 1_000_000 // _FASTEST_HZ[side]
-        """From the start of a measurement to that of the next, and how long it integrates: all of that [us]."""
+        self.period_us, self.delay_us = 1_000_000 // _FASTEST_HZ[side], _DELAY_US[side]
+        """From the start of a measurement to that of the next, and from its middle until it is ready [us]."""
         self.stream = 0
         """The device's count of measurements, from 0 to 254."""
         self.status = 255

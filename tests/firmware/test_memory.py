@@ -26,7 +26,7 @@ class Time:
 
 class Sensor:
     stream = status = mm = sigma = signal = ambient = spads = waiting = lost = scale_code = 0
-    budget_us, period_us, rate_hz = 15000, 20000, 416
+    delay_us, period_us, rate_hz = 7500, 20000, 416
     def begin(self): pass
     def ready(self): return source.us % 20_000 == 0
     def read(self): self.stream = (self.stream + 1) % 256

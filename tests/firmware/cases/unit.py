@@ -237,7 +237,7 @@ def _measured(samples):
 
 
 def each_zone_of_a_new_range_is_told_and_the_fields_of_the_range_are_of_the_nearest():
-    for side, least in ((4, 55), (8, 14)):
+    for side, least, delay_us in ((4, 55, 34_000), (8, 14, 59_000)):
         unit = _zoned(side)
         zones = [(255, 0, 0, 0, 0)] * 5 + [(5, 1, 4000, 128, 0)] + [(5, 1, 8000, 128, 0)] * (side * side - 6)
         unit.range_finder.target = lambda us, zones=zones: zones
@@ -246,6 +246,7 @@ def each_zone_of_a_new_range_is_told_and_the_fields_of_the_range_are_of_the_near
         new = _measured(samples)
         assert len(new) >= least, len(new)
         assert all(bool(s["zones"]) == bool(s["flags"] & NEW) for s in samples)
+        assert all(delay_us <= s["age"] < delay_us + 30_000 for s in new), "a pass and the bus"
         assert {len(s["zones"]) for s in new} == {2 + 5 * side * side}
         assert {(s["status"], s["mm"]) for s in new} == {(0, 1009 if side == 4 else 1072)}
         assert not _all_flags(samples) & LATE

@@ -83,7 +83,7 @@ def the_middle_of_a_measurement_is_half_a_budget_before_it_is_ready():
     _readings(clock, sensor, 0.1)
     while not sensor.ready():
         clock.advance(100)
-    assert abs(clock.now_us - sensor.budget_us // 2 - device.middle_us) < 500
+    assert abs(clock.now_us - sensor.delay_us - device.middle_us) < 500
 
 
 def a_transfer_that_breaks_off_does_no_harm():
