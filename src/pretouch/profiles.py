@@ -91,14 +91,18 @@ PROFILES: dict[str, Profile] = {
     "pretouch": Profile(
         name="pretouch",
         perception=PerceptionParams(
-            self_aside_m=0.005,
+            self_aside_m=0.03,
             memory=LocalMapParams(),
             outside=OutsidePoints(),
         ),
         task=TaskParams(mid_joint_projected=True),
         slow=None,
         approach=BrakingCurve(
-            untouched_s=6.0, effective_mass=EffectiveMass(), closing_deadband_m_s=0.05, tangential=Tangential()
+            margin_m=0.03,
+            untouched_s=6.0,
+            effective_mass=EffectiveMass(),
+            closing_deadband_m_s=0.05,
+            tangential=Tangential(),
         ),
         null_space=NullSpaceMotion(),
         window=WindowParams(freeze_while_reacting=True),

@@ -12,7 +12,7 @@ from pretouch.params import OutsidePoints
 from pretouch.perception.local_map import LocalMap, Look, index_of, remember
 from pretouch.perception.motion_compensation import FASTEST, JUMP_M
 from pretouch.perception.obstacles import Sight, speed_factor
-from pretouch.robot.body import Capsules, placed, to_axis
+from pretouch.robot.body import Capsules, gap_to, placed
 from pretouch.robot.kinematics import Chain, Kinematics, dot, point_velocity, separation
 from pretouch.types import FloatArray, SeenPoints
 
@@ -106,10 +106,10 @@ def take_points(
             moved_to = stamp
             _move(here, chain, posed - stamp, arm)
         u = sight.perception.spread_sigmas * sigma
-        gap = _gap(new.point, m, arm)
+        gap = gap_to(new.point, m, arm)
         if gap <= p.margin_m + u or gap > sight.memory.mark_m + u:
             continue
-        if _gap(new.point, m, fixtures) <= p.margin_m + u or _on_planes(new.point, m, sight.planes, p.margin_m + u):
+        if gap_to(new.point, m, fixtures) <= p.margin_m + u or _on_planes(new.point, m, sight.planes, p.margin_m + u):
             continue
         # of the points in one cell the nearest to the arm is remembered: it has the least width
         look = Look(stamp, (p.silent_after_s, p.silent_after_s), _FOOTPRINT * gap, u, units)
@@ -136,15 +136,6 @@ def _follow(places: LocalMap, look: Look, point: FloatArray, memory: float, velo
         for i in range(3):
             last = places.velocity[nearest, i]
             velocity[i] = last + gain * (point[i] - places.place[nearest, i] - dt * last)
-
-
-@kernel
-def _gap(points: FloatArray, m: int, capsules: Capsules) -> float:
-    """Return the distance [m] of point m from the nearest placed capsule, negative inside."""
-    least = np.inf
-    for c in range(len(capsules.radius)):
-        least = min(least, to_axis(points, m, capsules.a, capsules.b, c)[1] - capsules.radius[c])
-    return least
 
 
 @kernel

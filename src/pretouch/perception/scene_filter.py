@@ -1,13 +1,13 @@
 """Filter of returns from the arm itself or from declared fixtures: ray casting against the model."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from pretouch.compiled import compiled, inlined, kernel
 from pretouch.errors import FixtureError
-from pretouch.robot.body import Capsules, no_capsules, placed, to_axis
+from pretouch.perception.obstacles import locate
+from pretouch.robot.body import Capsules, gap_to, no_capsules, placed, to_axis
 from pretouch.robot.kinematics import Kinematics, dot
 from pretouch.sensing.sensor import Cones, Sensors
 from pretouch.types import BoolArray, FloatArray
@@ -76,19 +76,6 @@ def expected_range(kin: Kinematics, sensors: Sensors, cones: Cones, body: Capsul
     return near
 
 
-class ReturnSearch(NamedTuple):
-    """Limits of the search for a return."""
-
-    aside: float
-    """Thickness that is added to capsules [m]."""
-    beyond: float
-    """Distance from which a return counts [m]."""
-    within: float
-    """Distance up to which a return counts [m]."""
-    enough: float
-    """Distance [m]: the first return that counts and is no farther ends the search; it need not be the nearest."""
-
-
 @compiled
 def bounds(capsules: Capsules) -> FloatArray:
     """Return spheres (4, C) round capsules, slightly larger than necessary: x, y, z and radius [m]."""
@@ -111,32 +98,33 @@ def leave_out(
 ) -> None:  # fmt: skip
     """Remove from `shows` (K,) each fresh reading that a placed capsule explains, by a return up to `ends` (K,) [m].
 
-    A capsule that the cone misses by no more than `aside` [m] explains a `distance` (K,) [m] as far before as behind.
+    With an `aside` > 0 [m], a capsule that the cone misses by less explains a `distance` (K,) [m] of its place too.
     """
-    spheres = bounds(capsules)
+    spheres, points = bounds(capsules), locate(sensors.position, sensors.rotation, distance)
     for k in range(len(shows)):
         end = ends[k]
         if fresh[k] and shows[k]:
             # a farther return does not explain the reading, and the first one within is enough
-            shows[k] = capsule_return(sensors, k, capsules, spheres, cones, ReturnSearch(0.0, -np.inf, end, end)) > end
+            shows[k] = capsule_return(sensors, k, capsules, spheres, cones, end, end) > end
         if fresh[k] and shows[k] and aside > 0:
-            # A capsule that the cone misses hides nothing behind it: only a reading from about there belongs to it. A
-            # capsule with a nearer ray does not count.
-            nearby = ReturnSearch(aside, 2 * distance[k] - end, end, 2 * distance[k] - end)
-            shows[k] = capsule_return(sensors, k, capsules, spheres, cones, nearby) > end
+            beside = distance[k] * cones.edge[cones.kind[k], 2] + aside
+            shows[k] = gap_to(points, k, capsules, sensors.link[k]) > beside
 
 
 @compiled
 def nearest_capsule(sensors: Sensors, k: int, capsules: Capsules, spheres: FloatArray, cones: Cones) -> float:
     """Return the least distance [m] at which sensor k sees a placed capsule; `spheres` are those of `bounds`."""
-    return capsule_return(sensors, k, capsules, spheres, cones, ReturnSearch(0.0, -np.inf, np.inf, -np.inf))
+    return capsule_return(sensors, k, capsules, spheres, cones, np.inf, -np.inf)
 
 
 @kernel
 def capsule_return(
-    sensors: Sensors, k: int, capsules: Capsules, spheres: FloatArray, cones: Cones, search: ReturnSearch
+    sensors: Sensors, k: int, capsules: Capsules, spheres: FloatArray, cones: Cones, within: float, enough: float
 ) -> float:
-    """Return the least distance [m] at which sensor k sees a capsule that counts, infinite without one."""
+    """Return the least distance [m] up to `within` at which sensor k sees a capsule, infinite without one.
+
+    The first return that is no farther than `enough` [m] ends the search; it need not be the nearest.
+    """
     position, rotation, link, own = sensors.position, sensors.rotation, capsules.link, sensors.link[k]
     edge, rays = cones.edge[cones.kind[k]], cones.rays[cones.kind[k]]
     cos, sin = edge[0], edge[1]
@@ -148,8 +136,8 @@ def capsule_return(
     start = position[k, 0] * bx + position[k, 1] * by + position[k, 2] * bz
     least = np.inf
     for c in range(len(link)):
-        reach = spheres[3, c] + search.aside + _ROUNDING
-        if link[c] == own or far2[c] > (search.within + reach) ** 2:  # a unit does not see its own link
+        reach = spheres[3, c] + _ROUNDING
+        if link[c] == own or far2[c] > (within + reach) ** 2:  # a unit does not see its own link
             continue
         # the cone can meet the sphere only if it is ahead, and if cos l - sin z <= reach as in `_cone_meets`
         along = spheres[0, c] * bx + spheres[1, c] * by + spheres[2, c] * bz - start
@@ -158,13 +146,11 @@ def capsule_return(
         if along < -reach or (far2[c] - along * along) * (cos * cos) > inside * inside:
             continue
         # rays cost most: they are cast only at capsules that pass both tests
-        if _cone_meets(sensors, k, capsules, c, edge, search):
-            at = _cast(sensors, k, capsules, c, rays, search)
-            if at >= search.beyond:
-                least = min(least, at)
-            if least <= search.enough:
+        if _cone_meets(sensors, k, capsules, c, edge, within):
+            least = min(least, _cast(sensors, k, capsules, c, rays, enough))
+            if least <= enough:
                 return least
-    return least if least <= search.within else np.inf
+    return least if least <= within else np.inf
 
 
 @compiled
@@ -189,8 +175,8 @@ def plane_return(sensors: Sensors, k: int, planes: FloatArray, cones: Cones, wit
 
 
 @inlined
-def _cone_meets(sensors: Sensors, k: int, capsules: Capsules, c: int, edge: FloatArray, search: ReturnSearch) -> bool:
-    """Return whether the cone of sensor k can meet capsule c within the search; false is always right.
+def _cone_meets(sensors: Sensors, k: int, capsules: Capsules, c: int, edge: FloatArray, within: float) -> bool:
+    """Return whether the cone of sensor k can meet capsule c within a distance [m]; false is always right.
 
     With z along the beam and l across it, z sin - l cos is by how much a point lies inside the tangent plane of the
     cone: no point of the capsule's axis may be farther out than the radius. On the axis that is a convex function,
@@ -198,14 +184,14 @@ def _cone_meets(sensors: Sensors, k: int, capsules: Capsules, c: int, edge: Floa
     """
     position, rotation, a, b = sensors.position, sensors.rotation, capsules.a, capsules.b
     cos, sin = edge[0], edge[1]
-    reach = capsules.radius[c] + search.aside + _ROUNDING
+    reach = capsules.radius[c] + _ROUNDING
     ux, uy, uz = b[c, 0] - a[c, 0], b[c, 1] - a[c, 1], b[c, 2] - a[c, 2]
     x, y, z = a[c, 0] - position[k, 0], a[c, 1] - position[k, 1], a[c, 2] - position[k, 2]
     bx, by, bz = rotation[k, 0, 2], rotation[k, 1, 2], rotation[k, 2, 2]
     start, rise = x * bx + y * by + z * bz, ux * bx + uy * by + uz * bz
     if max(start, start + rise) < -reach:  # all of it is behind the sensor
         return False
-    if to_axis(position, k, a, b, c)[1] > search.within + reach:
+    if to_axis(position, k, a, b, c)[1] > within + reach:
         return False
     # across the beam: l(s)^2 = across + 2 s mixed + s^2 slope along the axis, s from 0 to 1
     across = max(0.0, x * x + y * y + z * z - start * start)
@@ -229,10 +215,10 @@ def _cone_meets(sensors: Sensors, k: int, capsules: Capsules, c: int, edge: Floa
 
 
 @inlined
-def _cast(sensors: Sensors, k: int, capsules: Capsules, c: int, rays: FloatArray, search: ReturnSearch) -> float:
+def _cast(sensors: Sensors, k: int, capsules: Capsules, c: int, rays: FloatArray, enough: float) -> float:
     """Return the least distance [m] to capsule c along the rays of sensor k, or the first one that is enough."""
     position, rotation, a, b = sensors.position, sensors.rotation, capsules.a, capsules.b
-    radius = capsules.radius[c] + search.aside
+    radius = capsules.radius[c]
     ux, uy, uz = b[c, 0] - a[c, 0], b[c, 1] - a[c, 1], b[c, 2] - a[c, 2]
     x, y, z = position[k, 0] - a[c, 0], position[k, 1] - a[c, 1], position[k, 2] - a[c, 2]
     R = rotation[k]
@@ -256,7 +242,7 @@ def _cast(sensors: Sensors, k: int, capsules: Capsules, c: int, rays: FloatArray
         ar = ux * rays[i, 0] + uy * rays[i, 1] + uz * rays[i, 2]
         rest = x * rays[i, 0] + y * rays[i, 1] + z * rays[i, 2]
         least = min(least, _from_outside(aa, ao, oo, ar, rest, radius))
-        if least <= search.enough:
+        if least <= enough:
             break
     return least
 

@@ -94,6 +94,16 @@ _MOST_CAPSULES, _MOST_AREA = 200, 50.0
 """Capsules that joints move, and their area [m^2]: a Panda has 18 and 0.9 m^2. Time grows with the product of both."""
 
 
+@kernel
+def gap_to(points: FloatArray, m: int, capsules: Capsules, without: int = -1) -> float:
+    """Return the distance [m] of point m from the nearest placed capsule that is not on a link; negative inside."""
+    least = np.inf
+    for c in range(len(capsules.radius)):
+        if capsules.link[c] != without:
+            least = min(least, to_axis(points, m, capsules.a, capsules.b, c)[1] - capsules.radius[c])
+    return least
+
+
 class Surface(NamedTuple):
     """N points on the outside of the capsules that joints move, those of a rigid body one after the other."""
 
