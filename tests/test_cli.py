@@ -202,7 +202,6 @@ def test_bash_takes_the_completion(capsys):
 
 def test_the_name_of_the_table_is_a_profile():
     assert profile("paper-off") == replace(profile("paper:approach=none"), name="paper-off")
-    assert profile("pretouch-zones:slow=on").perception.out_of_view_s == 5
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])

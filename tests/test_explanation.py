@@ -7,7 +7,17 @@ import pytest
 
 from pretouch.explanation import Doing, Explanation, Limit, Limited, explain, finds, still
 from pretouch.modes import TABLE, Event, Transition
-from pretouch.types import Contact, ControlStep, Mode, Obstacles, QpOutcome, QpSolution, Thresholds, Touched
+from pretouch.types import (
+    Contact,
+    ControlStep,
+    Mode,
+    Obstacles,
+    QpOutcome,
+    QpSolution,
+    Thresholds,
+    Touched,
+    no_obstacles,
+)
 
 UNITS, LINKS = ("hand_front", "hand_left"), ("link0", "link5", "hand")
 AHEAD = np.array([0.3, 0.0, 0.0])
@@ -16,8 +26,8 @@ AHEAD = np.array([0.3, 0.0, 0.0])
 def seen(*rows: tuple[int, float, float, int]) -> Obstacles:
     """Obstacles of (unit, distance from the end-effector, from the body [m], link)."""
     unit, ee, body, link = (np.array(column) for column in zip(*rows, strict=True)) if rows else (np.zeros(0),) * 4
-    zeros = np.zeros((len(rows), 3))
-    return Obstacles(unit.astype(int), zeros, ee, zeros, link.astype(int), zeros, body, np.zeros(len(rows)))
+    near = no_obstacles(len(rows))
+    return near._replace(unit=unit.astype(int), ee_distance=ee, link=link.astype(int), body_distance=body)
 
 
 def limited(slack: float = 0.0, multiplier: float = 1.0) -> QpSolution:

@@ -14,9 +14,9 @@ from pretouch.control.approach import ApproachRestriction, BrakingCurve
 from pretouch.errors import ParameterError, PretouchError
 from pretouch.params import (
     ClampParams,
-    ClosingSpeed,
     FailureParams,
     GiveUpParams,
+    LocalMapParams,
     OutsidePoints,
     PerceptionParams,
     PinchParams,
@@ -30,7 +30,7 @@ from pretouch.profiles import PROFILES, Profile, at_rate, profile
 from pretouch.sim.plant_params import PlantParams
 
 SETS = [
-    PerceptionParams(), OutsidePoints(), ClosingSpeed(), TaskParams(), SpeedReduction(), RestrictionParams(),
+    PerceptionParams(), OutsidePoints(), LocalMapParams(), TaskParams(), SpeedReduction(), RestrictionParams(),
     ThresholdParams(), FailureParams(),
     DecayingVelocity(), Admittance(), ClampParams(), PinchParams(), GiveUpParams(),
 ]  # fmt: skip
@@ -111,6 +111,7 @@ def test_choices_are_listed_when_refused(params: object, name: str):
     [
         (PerceptionParams(), {"slow_after_s": 0.3}, "silent_after_s"),
         (OutsidePoints(), {"slow_after_s": 0.4}, "silent_after_s"),
+        (PerceptionParams(), {"outside": OutsidePoints()}, "outside is set without a memory"),
         (RestrictionParams(), {"d_notice_m": 0.1}, "d_crit_m"),
         (ThresholdParams(), {"d_max_m": 0.05}, "d_min_m"),
         (ThresholdParams(), {"f_base_n": 4.0}, "f_d_n"),

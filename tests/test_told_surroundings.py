@@ -5,10 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.control.braking import Slots
 from pretouch.explanation import Limit, explain
-from pretouch.params import OutsidePoints
-from pretouch.perception.external_points import OutsideState
+from pretouch.perception.local_map import LocalMap
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
 from pretouch.realtime import warm_up
@@ -29,11 +27,6 @@ def seen(now: float, *point, sigma: float = 0.005) -> SeenPoints:
     return SeenPoints(now, np.full(len(at), now), at, np.full(len(at), sigma))
 
 
-def of_units(part: np.ndarray) -> np.ndarray:
-    """What slots hold of the skin's units, be there room for points from outside or not."""
-    return part.reshape(2, -1, *part.shape[1:])[:, :7]
-
-
 @pytest.mark.parametrize(("one", "other", "given"), [(PAPER, PAPER, True), (PRETOUCH, DEAF, False)])
 def test_a_profile_that_takes_no_points_and_one_without_a_source_do_the_same_to_the_bit(
     panda_model, paper_skin, one, other, given
@@ -42,12 +35,8 @@ def test_a_profile_that_takes_no_points_and_one_without_a_source_do_the_same_to_
     for _ in range(150):
         points = seen(beside.time, beside.ee() + np.array([0.0, 0.2, 0.0])) if given else None
         assert same(plain.step(), beside.step(points=points))
-    mine, other = plain.state.memory, beside.state.memory
-    assert same(replace(plain.state, memory=other), beside.state)
-    assert same(*(tuple(map(of_units, memory.part("slots", Slots))) for memory in (mine, other)))
-    assert all(
-        same(mine.get(path), other.get(path)) for path in mine.places if not path.startswith(("slots.", "outside."))
-    )
+    assert same(plain.state.memory.blocks, beside.state.memory.blocks)
+    assert same(replace(plain.state, memory=beside.state.memory), beside.state)
 
 
 @pytest.mark.parametrize("units", [7, 0])
@@ -129,17 +118,19 @@ def test_points_are_written_once_and_with_each_snapshot(panda_model, paper_skin)
     assert [inputs_of(each.inputs).points_at for each in kept] == [whole[0]] * whole[1] + [whole[1]] * (400 - whole[1])
 
 
-def test_another_number_of_places_begins_anew(panda_model, paper_skin):
+def test_with_another_number_of_obstacles_for_each_link_places_go_on_and_rows_begin_anew(panda_model, paper_skin):
     arm = Arm(panda_model, paper_skin, PRETOUCH)
     arm.step(points=seen(arm.time, arm.ee() + np.array([0.0, 0.3, 0.0])))
-    one = replace(PRETOUCH, perception=replace(PRETOUCH.perception, outside=OutsidePoints(per_link=1)))
-    other = controller_of(panda_model, paper_skin, one)
-    assert np.isnan(other.adopt(arm.state, arm.controller).memory.get("outside.source_stamp"))
-    arm.state, arm.controller = other.adopt(arm.state, arm.controller), other
-    step = arm.step(points=seen(arm.time, arm.ee() + np.array([0.0, 0.3, 0.0])))
-    assert (step.obstacles.unit >= 7).any()
-    again = other.adopt(arm.state, other).memory
-    assert same(again.part("outside", OutsideState), arm.state.memory.part("outside", OutsideState))
+    memory = replace(PRETOUCH.perception.memory, per_link=1)
+    other = controller_of(
+        panda_model, paper_skin, replace(PRETOUCH, perception=replace(PRETOUCH.perception, memory=memory))
+    )
+    before, after = arm.state.memory, other.adopt(arm.state, arm.controller).memory
+    assert before.get("places.number") == 1
+    assert same(after.part("places", LocalMap), before.part("places", LocalMap))
+    assert after.get("source_stamp") == before.get("source_stamp")
+    assert (before.get("slots.link") >= 0).any()
+    assert not (after.get("slots.link") >= 0).any()
 
 
 def test_time_that_goes_backwards_forgets_what_a_source_showed(panda_model, paper_skin):
@@ -147,7 +138,7 @@ def test_time_that_goes_backwards_forgets_what_a_source_showed(panda_model, pape
     assert (arm.step(points=seen(arm.time, arm.ee() + np.array([0.0, 0.3, 0.0]))).obstacles.unit >= 7).any()
     arm.time -= 0.5
     assert not (arm.step(points=seen(arm.time)).obstacles.unit >= 7).any()
-    assert arm.state.memory.get("outside.source_stamp") < arm.time
+    assert arm.state.memory.get("source_stamp") < arm.time
 
 
 def test_warming_up_knows_of_points_and_leaves_the_arm_as_it_is(panda_model, paper_skin):

@@ -64,9 +64,9 @@ def standing(
 
 def something(link: int, at: FloatArray, away: FloatArray, distance: float, ee_distance: float) -> Obstacles:
     """One object so far from a place (3,) of a link's surface [m], in a direction (3,) away from it."""
-    return Obstacles(
-        np.zeros(1, np.int64), (at + distance * away)[None], np.array([ee_distance]), at[None], np.array([link]),
-        away[None], np.array([distance]), np.zeros(1),
+    return no_obstacles(1)._replace(
+        point=(at + distance * away)[None], ee_distance=np.array([ee_distance]), body_point=at[None],
+        link=np.array([link]), direction=away[None], body_distance=np.array([distance]),
     )  # fmt: skip
 
 

@@ -22,7 +22,7 @@ from pretouch.control.braking import (
 from pretouch.params.pretouch import REGIONS, BrakingParams, EffectiveMass, Tangential
 from pretouch.robot.kinematics import Chain, tangents_of
 from pretouch.robot.model import RobotModel
-from pretouch.types import FloatArray, no_obstacles
+from pretouch.types import SEEN_NOW_S, FloatArray, no_obstacles
 
 DT, A, TOUCH, TASK, NOTICE = 0.01, 0.3, 0.03, 0.3, 0.6
 TIGHTEN, LOOSEN, RETREAT, NEAR, SLOWEST = 3.0, 1.0, 0.1, 0.1, 0.1
@@ -36,35 +36,35 @@ class Sled:
     anchor, axis = np.array([[-1000.0, 0.0, 0.0]]), np.array([[0.0, -1.0, 0.0]])
     moved_by = np.array([[False], [True], [True]])
 
-    def __init__(self, across: bool = False, units: int = 1) -> None:
-        self.slots, self.units = slots_init(units), units
+    def __init__(self, across: bool = False, slots: int = 1, margin: float = 0.0) -> None:
+        self.slots = slots_init(slots)
         params = BrakingParams(
-            d_notice_m=NOTICE, deceleration_m_s2=A, latency_s=0.0, margin_m=0.0, retreat_max_m_s=RETREAT,
+            d_notice_m=NOTICE, deceleration_m_s2=A, latency_s=0.0, margin_m=margin, retreat_max_m_s=RETREAT,
             touch_speed_max_m_s=TOUCH, tighten_m_s2=TIGHTEN, loosen_m_s2=LOOSEN,
             tangential=Tangential(distance_m=NEAR, speed_m_s=SLOWEST) if across else None,
         )  # fmt: skip
         self.numbers = braking_numbers(params, TASK, DT)
-        self.untouched = sys.maxsize
+        self.untouched, self.age = (sys.maxsize, 0.0, np.inf), 0.0
 
     def rows(
         self, speed: float, seen: dict[int, tuple[int, float]], closing: float = 0.0, normal: FloatArray = UP
     ) -> tuple[int, FloatArray, FloatArray]:
-        """Rows of units that see {unit: (link, distance)}: how many are of what is seen, G in m/s, h."""
+        """Rows of what is seen, {slot: (link, distance)}: how many are of that, G in m/s, h."""
         k = len(seen)
         obstacles = no_obstacles(k)._replace(
-            unit=np.array(list(seen), np.int64), link=np.array([link for link, _ in seen.values()], np.int64),
+            slot=np.array(list(seen), np.int64), link=np.array([link for link, _ in seen.values()], np.int64),
             direction=np.tile(normal, (k, 1)), body_distance=np.array([d for _, d in seen.values()]),
-            closing_speed=np.full(k, closing),
+            closing_speed=np.full(k, closing), age=np.full(k, self.age),
         )  # fmt: skip
         chain = Chain(self.anchor, self.axis, self.moved_by, np.array([speed / 1000.0]))
         p, light = self.numbers, np.empty((0, 0))
-        rows = braking_rows(p, self.slots, obstacles, chain, light, (p.touch, 0.0, self.untouched))
+        rows = braking_rows(p, self.slots, obstacles, chain, light, (p.touch, 0.0), self.untouched)
         return len(rows.which), rows.G[:, 0] / 1000.0, rows.h
 
 
 def test_what_is_not_to_be_touched_is_not_approached_at_its_surface():
     seen, kept_off = Sled(), Sled()
-    kept_off.untouched = 0
+    kept_off.untouched = 0, 0.0, np.inf
     for sled, least in ((seen, TOUCH), (kept_off, 0.0)):
         for _ in range(2000):
             _, _, h = sled.rows(0.0, {0: (1, 0.0)})
@@ -73,6 +73,67 @@ def test_what_is_not_to_be_touched_is_not_approached_at_its_surface():
         for _ in range(2000):
             _, _, h = sled.rows(0.0, {0: (1, 0.08)})
         assert h == pytest.approx([np.sqrt(least**2 + 2 * A * 0.08)])
+
+
+# stop, then touch: what was seen in the last 6 s is not touched, at a margin of 2 cm
+
+
+def stopping(age: float) -> Sled:
+    sled = Sled(margin=0.02)
+    sled.untouched, sled.age = (sys.maxsize, 6.0, np.inf), age
+    return sled
+
+
+@pytest.mark.parametrize(
+    ("age", "distance", "limit"),
+    [
+        (5.99, 0.02, 0.0),
+        (6.0, 0.02, TOUCH),
+        # within the margin back to it, by 4 m/s for each metre
+        (5.99, 0.01, -0.04),
+        (0.0, -0.03, -RETREAT),
+        (6.0, -0.03, TOUCH),
+        # 19 mm before it, sqrt(2 * 0.3 * 0.019), at once
+        (5.99, 0.039, np.sqrt(2 * A * 0.019)),
+        # and 21 mm before it as a row tightens
+        (5.99, 0.041, 0.3 - TIGHTEN * DT),
+    ],
+)
+def test_what_was_seen_lately_is_not_touched_and_limits_at_once_near_the_margin(age, distance, limit):
+    if limit == TOUCH:  # not at once
+        sled = stopping(age)
+        for _ in range(50):
+            h = sled.rows(TOUCH, {0: (1, distance)})[2]
+    else:
+        h = stopping(age).rows(0.3, {0: (1, distance)})[2]
+    assert h == pytest.approx([limit])
+
+
+def test_an_arm_that_keeps_the_limit_never_comes_nearer_than_the_margin():
+    sled, d, v = stopping(0.0), 0.3, 0.3
+    for _ in range(1000):
+        v = min(0.3, *sled.rows(v, {0: (1, d)})[2])
+        d -= v * DT
+    assert 0.02 - 1e-9 <= d < 0.0201
+
+
+def test_what_goes_out_of_sight_is_touched_once_it_is_old():
+    sled = stopping(0.0)
+    limits = []
+    for i in range(800):
+        sled.age = i * DT
+        limits.append(float(sled.rows(0.0, {0: (1, 0.02)})[2][0]))
+    assert limits[:600] == [0.0] * 600
+    assert limits[605] == pytest.approx(TOUCH)
+
+
+def test_while_a_contact_moves_the_arm_only_what_is_seen_now_counts():
+    sled = stopping(0.0)
+    sled.untouched = sys.maxsize, 0.0, SEEN_NOW_S
+    for age, rows in ((0.29, 1), (0.31, 0)):
+        sled.age = age
+        assert sled.rows(0.0, {0: (1, 0.0)})[0] == rows
+    assert SEEN_NOW_S == 0.3
 
 
 def test_the_curve_by_numbers():
@@ -177,17 +238,12 @@ def test_a_point_seen_again_goes_on_from_where_its_row_had_come():
     assert sled.rows(0.03, {0: (1, 0.3)})[2][0] == pytest.approx(TOUCH + 4 * LOOSEN * DT)
 
 
-def test_another_closest_link_adds_a_row_and_the_first_fades():
+def test_the_row_of_another_closest_link_starts_at_the_speed_of_the_arm():
     sled = Sled()
     sled.rows(0.03, {0: (1, 0.0)})
-    found, G, h = sled.rows(0.03, {0: (2, 0.0)})
-    assert found == 1
-    assert len(G) == 2
-    assert h[1] == pytest.approx(TOUCH + LOOSEN * DT)
-    # and back: the two change places, neither is lost
-    found, G, h = sled.rows(0.03, {0: (1, 0.3)})
-    assert len(G) == 2
-    assert h[0] == pytest.approx(TOUCH + 2 * LOOSEN * DT)
+    found, G, h = sled.rows(0.03, {0: (2, 0.1)})
+    assert found == len(G) == 1
+    assert h[0] == pytest.approx(np.sqrt(TOUCH**2 + 2 * A * 0.1))
 
 
 @examples(100, least=50)
@@ -242,13 +298,13 @@ def test_tangents_are_across_the_normal_whatever_it_is(v):
     np.testing.assert_allclose(np.vstack([n, t]) @ np.vstack([n, t]).T, np.eye(3), atol=1e-12)
 
 
-def test_units_keep_their_rows_apart():
-    sled = Sled(units=3)
+def test_obstacles_keep_their_rows_apart():
+    sled = Sled(slots=3)
     found, _, h = sled.rows(0.0, {0: (1, 0.0), 2: (2, 0.2)})
     assert found == 2
     assert h[0] == pytest.approx(TOUCH)
     assert h[1] == pytest.approx(np.sqrt(TOUCH**2 + 2 * A * 0.2))
-    assert sled.slots.link.tolist() == [1, -1, 2, -1, -1, -1]
+    assert sled.slots.link.tolist() == [1, -1, 2]
     assert sled.slots.limit[0] == pytest.approx(TOUCH)
 
 

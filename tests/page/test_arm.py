@@ -23,7 +23,7 @@ from pretouch.page.arm import (
 )
 from pretouch.page.surfaces import capsule_surfaces
 from pretouch.params import ThresholdParams
-from pretouch.types import Obstacles
+from pretouch.types import Obstacles, no_obstacles
 
 PERIOD = 1 / 30
 
@@ -116,12 +116,7 @@ UP = np.array([[0.0, 0.0, 1.0]])
 
 
 def obstacles(units: list[int], distances: list[float]) -> Obstacles:
-    count = len(units)
-    zeros = np.zeros((count, 3))
-    return Obstacles(
-        np.array(units, np.int64), zeros, np.zeros(count), zeros, np.zeros(count, np.int64), zeros,
-        np.array(distances), np.zeros(count),
-    )  # fmt: skip
+    return no_obstacles(len(units))._replace(unit=np.array(units, np.int64), body_distance=np.array(distances))
 
 
 @pytest.mark.parametrize(

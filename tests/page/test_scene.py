@@ -12,7 +12,7 @@ from pretouch.page.scene import ARROW_MOST_M, PARTS, Scene
 from pretouch.page.simulation import LiveSimulation
 from pretouch.page.trail import BLOCK, BLOCKS, SPACING_M, Activity, Trail, activity
 from pretouch.profiles import PROFILES
-from pretouch.types import NOT_TOUCHED, ControlStep, Mode, Obstacles, Touched, no_obstacles
+from pretouch.types import NOT_TOUCHED, ControlStep, Mode, Touched, no_obstacles
 
 POINT = np.array([0.7, 0.1, 0.3])
 CONES, UNITS = "/arm/panda_hand/cones", "/arm/panda_hand/units"
@@ -44,8 +44,11 @@ def drawn(scene, fake):
 def sensing(step: ControlStep, multiplier: float = 0.0) -> ControlStep:
     """A step in which unit 2 senses a point, 0.2 m off the body, whose restriction has a multiplier."""
     at, direction = POINT[None], np.array([[1.0, 0.0, 0.0]])
-    unit, away, body_point = np.array([2]), np.array([0.2]), at - 0.2 * direction
-    obstacles = Obstacles(unit, at, away, body_point, np.array([10]), direction, away, np.zeros(1))
+    away, body_point = np.array([0.2]), at - 0.2 * direction
+    obstacles = no_obstacles(1)._replace(
+        unit=np.array([2]), point=at, ee_distance=away, body_point=body_point, link=np.array([10]),
+        direction=direction, body_distance=away,
+    )  # fmt: skip
     qp = replace(step.qp, slack=np.zeros(1), multipliers=np.append(np.zeros(len(step.q)), multiplier))
     distance = np.where(np.arange(7) == 2, 0.2, np.nan)
     return replace(step, obstacles=obstacles, range_distance=distance, restricted=np.array([0]), qp=qp)

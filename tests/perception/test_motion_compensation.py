@@ -1,37 +1,32 @@
-"""Points while things and the arm move: closing speed, points too near to measure, and late readings."""
+"""Points while things and the arm move: the speed of things, and late readings."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from tests.perception.watcher import Watcher, readings_of
 
 from pretouch.params import PerceptionParams
-from pretouch.perception.motion_compensation import closing_speeds, follow_points, move_back, reckon
+from pretouch.perception.motion_compensation import follow_points, move_back
 from pretouch.perception.obstacles import placed_sensors, track_init
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
 from pretouch.robot.kinematics import Chain
-from pretouch.sensing.sensor import PAPER_SENSOR, Sensors, cones_of
-from pretouch.types import no_obstacles
 
 MEMORY, PERIOD = 0.09, 0.02
-TOWARDS_ME = np.array([0.0, 0.0, 1.0])
+AWAY = np.array([0.0, 0.0, 1.0])
 
 
 def followed(distance, stamps=None, memory=MEMORY) -> list[float]:
-    """Closing speeds of one unit that looks up from the origin, after each of its readings."""
+    """Speeds [m/s] towards a unit that looks up from the origin, after each of its readings."""
     stamps = PERIOD * np.arange(len(distance)) if stamps is None else stamps
-    tracks, near, found = track_init(1), no_obstacles(1)._replace(direction=TOWARDS_ME[None]), []
+    tracks, speeds = track_init(1), []
     for t, d in zip(stamps, distance, strict=True):
-        point, stamp = d * TOWARDS_ME[None], np.array([t])
+        point, stamp = d * AWAY[None], np.array([t])
         follow_points(tracks, point, stamp, np.ones(1, np.bool_), memory)
-        closing_speeds(tracks.motion, near)
         tracks = tracks._replace(point=point, point_stamp=stamp)
-        found.append(float(near.closing_speed[0]))
-    return found
+        speeds.append(-float(tracks.motion[1, 0] @ AWAY))
+    return speeds
 
 
 def test_nothing_is_known_after_one_reading():
@@ -78,47 +73,6 @@ def test_readings_that_are_not_taken_change_nothing():
     assert np.isnan(tracks.motion[:, 1]).all()
 
 
-@given(st.lists(st.floats(0.0, 1.3), min_size=1, max_size=20), st.lists(st.floats(1e-4, 0.5), min_size=20, max_size=20))
-def test_whatever_is_read_the_speed_is_one_a_hand_can_have(distance, gaps):
-    found = followed(distance, stamps=np.cumsum(gaps)[: len(distance)])
-    assert np.isfinite(found).all()
-    assert np.abs(found).max() <= 2.0
-
-
-def reckoned(distance: float, last: float | None, sensor: float = 0.0, velocity: float = 0.0, age: float = 0.02):
-    """Height of the point of a unit at a height, looking up, that last saw something at another."""
-    points = np.array([[0.0, 0.0, sensor + distance]])
-    tracks = track_init(1)
-    tracks.motion[0], tracks.motion[1] = 0.0, velocity * TOWARDS_ME
-    before = np.full((1, 3), np.nan) if last is None else last * TOWARDS_ME[None]
-    stamp = np.array([-np.inf if last is None else 1.0 - age])
-    reckon(
-        points, np.array([distance]), np.ones(1), tracks._replace(point=before, point_stamp=stamp),
-        Sensors(sensor * TOWARDS_ME[None], np.eye(3)[None], np.zeros(1, np.int64)), cones_of([PAPER_SENSOR]), 0.18,
-    )  # fmt: skip
-    return float(points[0, 2] - sensor)
-
-
-@pytest.mark.parametrize(
-    ("given", "height"),
-    [
-        ({"distance": 0.3, "last": 0.1}, 0.3),  # what the sensor can measure stands
-        # nearer than that a point stays where it was last seen: the arm has come to 25 mm of where it was
-        ({"distance": 0.04, "last": 0.055, "sensor": 0.03}, 0.025),
-        ({"distance": 0.04, "last": 0.2}, 0.04),
-        ({"distance": 0.04, "last": 0.01, "sensor": 0.02}, 0.0),
-        # one that comes by itself is moved on, and a slow one is not
-        ({"distance": 0.04, "last": 0.04, "velocity": -0.5}, 0.03),
-        ({"distance": 0.04, "last": 0.04, "velocity": -0.05}, 0.04),
-        # what was never seen farther off is taken to touch
-        ({"distance": 0.04, "last": None}, 0.0),
-        ({"distance": 0.04, "last": 0.04, "age": 1.0}, 0.0),
-    ],
-)
-def test_where_a_point_is_that_is_nearer_than_the_sensor_measures(given: dict, height: float):
-    assert reckoned(**given) == pytest.approx(height)
-
-
 # late readings of an arm that moves: with the pose at their stamp, what stands still is where it stands
 
 
@@ -131,7 +85,7 @@ def errors(model, skin, params: PerceptionParams, noise: float = 0.0) -> list[fl
     unit, rng, q0 = skin.ids.index("hand_left"), np.random.default_rng(1000), model.description.q_ready
     position, rotation, _ = placed(model, skin, q0)
     normal, on = rotation[unit, :, 2].copy(), position[unit] + 0.5 * rotation[unit, :, 2]
-    watcher, found = Watcher(model, skin, no_fixtures(), params), []
+    watcher, off = Watcher(model, skin, no_fixtures(), params), []
     for i in range(6, 60):
         now = 0.01 * i
         then = now - LATE_S
@@ -140,8 +94,9 @@ def errors(model, skin, params: PerceptionParams, noise: float = 0.0) -> list[fl
         distance = float((on - at[unit]) @ normal / (beam @ normal)) + noise * rng.standard_normal()
         readings = readings_of(skin, then, hand_left=distance)
         watcher.q, watcher.qd = q0 + QD * now, QD
-        found.append(float((watcher.take(readings, now).point[0] - on) @ normal))
-    return found
+        watcher.take(readings, now)
+        off.append(float((watcher.state.point[unit] - on) @ normal))
+    return off
 
 
 def placed(model, skin, q):
@@ -150,7 +105,7 @@ def placed(model, skin, q):
 
 def test_a_plane_stays_where_it_is_while_the_arm_turns(panda_model, paper_skin):
     exact = replace(PROFILES["pretouch"].perception, spread_sigmas=0.0)
-    late = replace(exact, place_at_stamp=False)
+    late = replace(exact, memory=None, outside=None)
     assert max(map(abs, errors(panda_model, paper_skin, exact))) < 0.004
     assert max(map(abs, errors(panda_model, paper_skin, late))) > 0.01, "and not where the arm has gone on to"
 
@@ -167,8 +122,9 @@ def test_poses_go_back_as_the_arm_came(panda_model, paper_skin):
     kin, age = panda_model.kinematics(q), 0.001
     stamp = np.full(len(paper_skin), 7.0 - age)
     move_back(
-        sensors, np.ones(len(stamp), np.bool_), stamp, Chain(kin.anchor, kin.axis, panda_model.moved_by, QD), 7.0, 0.06
-    )
+        sensors, np.ones(len(stamp), np.bool_), stamp, Chain(kin.anchor, kin.axis, panda_model.moved_by, QD), 7.0,
+        np.full(len(stamp), 0.06),
+    )  # fmt: skip
     position, rotation, _ = sensors
     at, turned, _ = placed(panda_model, paper_skin, q - QD * age)
     np.testing.assert_allclose(position, at, atol=1e-6)
@@ -181,12 +137,12 @@ def test_no_reading_is_moved_back_by_more_than_it_lasts_nor_into_the_future(pand
     kin = panda_model.kinematics(q)
     chain = Chain(kin.anchor, kin.axis, panda_model.moved_by, QD)
     here = placed(panda_model, paper_skin, q)
-    stays = placed(panda_model, paper_skin, q)
-    move_back(stays, np.ones(len(paper_skin), np.bool_), np.full(len(paper_skin), 7.5), chain, 7.0, 0.06)
+    stays, lives = placed(panda_model, paper_skin, q), np.full(len(paper_skin), 0.06)
+    move_back(stays, np.ones(len(paper_skin), np.bool_), np.full(len(paper_skin), 7.5), chain, 7.0, lives)
     np.testing.assert_array_equal(stays.position, here.position)
     for stamp, same in ((-np.inf, 6.94), (6.0, 6.94)):
         first, second = placed(panda_model, paper_skin, q), placed(panda_model, paper_skin, q)
         for at, pose in ((stamp, first), (same, second)):
             stamps = np.full(len(paper_skin), at)
-            move_back(pose, np.ones(len(stamps), np.bool_), stamps, chain, 7.0, 0.06)
+            move_back(pose, np.ones(len(stamps), np.bool_), stamps, chain, 7.0, lives)
         np.testing.assert_allclose(first[0], second[0], atol=1e-12)

@@ -58,8 +58,10 @@ def test_of_each_link_the_nearest_place_is_an_obstacle(panda_model):
     kin = panda_model.kinematics(panda_model.description.q_ready)
     # 0.5 m beside the base, at the height of the hand's origin
     center = np.array([0.3, 0.5, 0.5])
-    found = near_moving(ball(center, velocity=(0.0, -0.2, 0.0), stamp=1.0), panda_model, kin, 1.0, 7)
-    assert found.unit.tolist() == list(range(7, 7 + len(panda_model.parts)))
+    found = near_moving(ball(center, velocity=(0.0, -0.2, 0.0), stamp=1.0), panda_model, kin, 1.0, (7, 30))
+    assert set(found.unit.tolist()) == {7}
+    assert found.slot.tolist() == list(range(30, 30 + len(panda_model.parts)))
+    assert not found.age.any()
     assert found.link.tolist() == panda_model.parts.tolist()
     # it slows nothing by eq. 3
     assert np.isinf(found.ee_distance).all()
@@ -83,7 +85,7 @@ def test_of_another_arm_the_nearest_capsules_are_found(panda_model):
     a, b = rng.uniform(-0.8, 0.8, (2, 30, 3))
     b[:5] = a[:5]  # balls
     many = MovingFixtures(0.0, a, b, rng.uniform(0.02, 0.1, 30), np.zeros((30, 3)), np.zeros((30, 3)))
-    found = near_moving(many, panda_model, kin, 0.0, 0)
+    found = near_moving(many, panda_model, kin, 0.0, (0, 0))
     (_, a_own, b_own, _), body = placed(panda_model.body, kin), panda_model.body
     gap = segment_distance(a_own[:, None], b_own[:, None], a[None], b[None]) - body.radius[:, None] - many.radius
     assert found.body_distance == pytest.approx([gap[body.link == link].min() for link in panda_model.parts])
@@ -96,7 +98,7 @@ def test_a_moving_axis_comes_nearer_as_fast_as_its_nearest_point(panda_model):
         0.0, np.array([[0.9, 0.0, 0.0]]), np.array([[0.9, 0.0, 1.0]]), np.array([0.03]), np.zeros((1, 3)),
         np.array([[-0.4, 0.0, 0.0]]),
     )  # fmt: skip
-    before, after = (near_moving(rod, panda_model, kin, t, 0) for t in (0.0, 1e-5))
+    before, after = (near_moving(rod, panda_model, kin, t, (0, 0)) for t in (0.0, 1e-5))
     rate = (before.body_distance - after.body_distance) / 1e-5
     assert before.closing_speed == pytest.approx(rate, abs=1e-3)
     assert before.closing_speed.max() > 0.1

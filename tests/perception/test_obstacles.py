@@ -29,9 +29,10 @@ def _reading(distance, status) -> tuple[np.ndarray, np.ndarray]:
 def track(
     state: TrackState, stamps: list[float], points: np.ndarray, shows: np.ndarray, tells: np.ndarray, now: float
 ) -> TrackState:
-    """The state after readings of these stamps; a point is dropped after 0.06 s."""
+    """The state after readings of these stamps; what shows an obstacle has a target."""
     after, stamp = TrackState._make(part.copy() for part in state), np.array(stamps)
-    update_tracks(after, stamp, points, (newer(state.reading_stamp, stamp, now), shows, tells), now, 0.06)
+    flags = newer(state.reading_stamp, stamp, now), shows, tells
+    update_tracks(after, stamp, points, flags, np.where(shows, 1.0, NAN))
     return after
 
 
@@ -105,8 +106,6 @@ HIT, MISS, FAILURE = (True, True), (False, True), (False, False)
         # a reading from the future waits until its time
         ([(10.02, 10.0, HIT)], -INF, -INF, -INF),
         ([(10.02, 10.0, HIT), (10.02, 10.02, HIT)], 10.02, 10.02, 10.02),
-        # one that comes too late is used up but shows nothing
-        ([(10.0, 10.07, HIT)], -INF, 10.0, 10.0),
         # a failure is used up, but is no report
         ([(10.0, 10.0, HIT), (10.02, 10.02, FAILURE)], 10.0, 10.02, 10.0),
         ([(10.0, 10.0, HIT), (10.02, 10.02, FAILURE), (10.04, 10.05, MISS)], 10.0, 10.04, 10.04),
@@ -116,7 +115,8 @@ def test_what_is_remembered_of_a_unit_after_readings(readings, seen, used, heard
     state = track_init(1)
     for stamp, now, (shows, tells) in readings:
         state = _take(state, stamp, now, x=stamp, shows=shows, tells=tells)  # the point tells its stamp
-    assert (state.point_stamp, state.reading_stamp, state.report_stamp) == (seen, used, heard)
+    stamps = state.point_stamp, state.target_stamp, state.reading_stamp, state.report_stamp
+    assert stamps == (seen, seen, used, heard)
     np.testing.assert_array_equal(state.point, [[NAN] * 3 if seen == -INF else [seen, 0.0, 0.0]])
 
 

@@ -1,7 +1,5 @@
 """From readings to obstacles: which, where, for how long, and what silence does."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,8 +8,6 @@ from tests.examples import examples
 from tests.perception.watcher import HAND_LEFT, PARAMS, TCP, Watcher, readings_of
 
 from pretouch.perception.obstacles import silent_units
-from pretouch.perception.scene_filter import no_fixtures
-from pretouch.profiles import PROFILES
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.types import RangeReadings, RangeStatus
@@ -65,6 +61,12 @@ def test_an_obstacle_is_given_up_after_its_persistence(watcher):
     assert len(watcher.take(old, 1.02).unit) == 1  # by the time it was seen, not by how often it was asked
 
 
+def test_a_reading_that_comes_too_late_shows_nothing_and_is_a_report(watcher):
+    late = readings_of(watcher.skin, 1.0, hand_left=0.3)
+    assert len(watcher.take(late, 1.07).unit) == 0
+    assert watcher.state.report_stamp[watcher.skin.ids.index("hand_left")] == 1.0
+
+
 # What is known to be there
 
 
@@ -113,8 +115,9 @@ def test_whatever_arrives_obstacles_are_whole(panda_model, paper_skin, steps):
         now = 1.0 + 0.05 * tick
         stamp, distance, status = (np.array(part) for part in zip(*step, strict=True))
         found = watcher.take(RangeReadings(stamp.astype(float), distance.astype(float), status.astype(np.int64)), now)
-        assert np.all(now - watcher.state.point_stamp[found.unit] <= PARAMS.persistence_s)
-        assert np.all(watcher.state.point_stamp[found.unit] <= now)
+        np.testing.assert_array_equal(found.age, now - watcher.state.point_stamp[found.unit])
+        np.testing.assert_array_equal(found.slot, found.unit)
+        assert np.all((found.age >= 0.0) & (found.age <= PARAMS.persistence_s))
         for part in (found.point, found.body_point, found.direction, found.body_distance, found.ee_distance):
             assert np.all(np.isfinite(part))
         np.testing.assert_allclose(np.linalg.norm(found.direction, axis=1), 1.0, atol=1e-9)
@@ -181,78 +184,3 @@ def test_the_arm_stands_exactly_when_a_unit_is_named(panda_model, paper_skin, ag
     assert 0.0 <= left <= 1.0
     assert (left == 0.0) == bool(silent)
     assert left == 1.0 or max(ages) > 0.0999 or min(ages) < 0.0
-
-
-# a point from which the arm carries the beam away is kept, and given up once its place is seen empty
-
-
-KEPT_S = 1.0
-NOTHING = (np.nan, RangeStatus.SIGNAL)
-"""Too little light: nothing is near."""
-
-
-class TurnedWatcher(Watcher):
-    """Perception of the hand's left unit alone."""
-
-    def __init__(self, model, skin, kept=KEPT_S):
-        super().__init__(model, skin, no_fixtures(), replace(PROFILES["paper"].perception, out_of_view_s=kept))
-
-    def at(self, now, turned, reading):
-        """Points at an instant [s] with joint 1 turned by an angle [deg], a new reading of the unit."""
-        self.q = self.model.description.q_ready + np.deg2rad(turned) * np.eye(7)[0]
-        return self.see(now, reading[1], hand_left=reading[0]).point
-
-
-OBJECT = (0.3, RangeStatus.OK)
-
-
-@pytest.fixture
-def turned(panda_model, paper_skin):
-    return TurnedWatcher(panda_model, paper_skin)
-
-
-def test_a_point_is_kept_for_its_time_while_the_beam_goes_on(turned):
-    there = turned.at(0.0, 0.0, OBJECT)
-    assert len(there) == 1
-    for now in (0.1, 0.5, 0.99):
-        np.testing.assert_array_equal(turned.at(now, 40 * now, NOTHING), there)
-    assert len(turned.at(1.02, 40.0, NOTHING)) == 0
-
-
-def test_without_it_the_point_goes(panda_model, paper_skin):
-    turned = TurnedWatcher(panda_model, paper_skin, kept=0.0)
-    turned.at(0.0, 0.0, OBJECT)
-    assert len(turned.at(0.1, 4.0, NOTHING)) == 0
-
-
-def test_of_an_arm_at_rest_it_goes_as_ever(turned):
-    turned.at(0.0, 0.0, OBJECT)
-    assert len(turned.at(0.05, 0.0, NOTHING)) == 1, "one missed reading"
-    assert len(turned.at(0.1, 0.0, NOTHING)) == 0
-
-
-def test_a_place_seen_empty_is_empty_when_the_beam_leaves_it_again(turned):
-    turned.at(0.0, 0.0, OBJECT)
-    assert len(turned.at(0.1, 4.0, NOTHING)) == 1
-    assert len(turned.at(0.2, 0.0, NOTHING)) == 0
-    assert len(turned.at(0.3, 4.0, NOTHING)) == 0
-
-
-@pytest.mark.parametrize(
-    ("reading", "kept"),
-    [((np.nan, RangeStatus.HARDWARE), True), ((1.2, RangeStatus.OK), False)],
-    ids=["a failure tells nothing", "what lies behind it is seen"],
-)
-def test_only_a_look_through_its_place_says_that_it_is_empty(turned, reading, kept):
-    first = turned.at(0.0, 0.0, OBJECT)
-    turned.at(0.1, 4.0, NOTHING)
-    turned.at(0.2, 0.0, reading)
-    points = turned.at(0.3, 4.0, NOTHING)
-    assert any(np.array_equal(point, first[0]) for point in points) == kept
-
-
-def test_what_is_seen_next_takes_its_place(turned):
-    turned.at(0.0, 0.0, OBJECT)
-    points = turned.at(0.1, 4.0, (0.2, RangeStatus.OK))
-    assert len(points) == 1
-    np.testing.assert_array_equal(turned.at(0.2, 8.0, NOTHING), points)

@@ -53,7 +53,6 @@ class Eyes:
         """Begin anew."""
         units = range(len(self.skin))
         self.point: list[np.ndarray | None] = [None for _ in units]
-        self.direction: list[np.ndarray | None] = [None for _ in units]
         self.seen = [-np.inf for _ in units]
         self.used = [-np.inf for _ in units]
         self.heard = [-np.inf for _ in units]
@@ -67,7 +66,7 @@ class Eyes:
             T = posture.T[self.skin.link[k]] @ self.skin.T_link_sensor[k]
             self._take(k, T, posture, readings, now)
             if now - self.seen[k] <= self.params.persistence_s:
-                found.append((k, *self._nearest(k, T, posture, ee)))
+                found.append((k, now - self.seen[k], *self._nearest(k, T, posture, ee)))
         return obstacles_of(found)
 
     def _take(self, k: int, T: np.ndarray, posture: Posture, readings: RangeReadings, now: float) -> None:
@@ -106,12 +105,9 @@ class Eyes:
         return nearest
 
     def _nearest(self, k: int, T: np.ndarray, posture: Posture, ee: np.ndarray) -> tuple:
-        point, last = self.point[k], self.direction[k]
+        point, body = self.point[k], self.model.body
         assert point is not None
-        body = self.model.body
-        fallback = T[:3, 2] if last is None else last
-        c, on_body, direction, distance = closest(point, *posture.ends(body), body.radius, fallback)
-        self.direction[k] = direction
+        c, on_body, direction, distance = closest(point, *posture.ends(body), body.radius, np.array([0.0, 0.0, 1.0]))
         u = self._spread(k, float(np.linalg.norm(point - T[:3, 3])))
         return point, max(0.0, np.linalg.norm(point - ee) - u), on_body, body.link[c], direction, distance - u
 
@@ -127,10 +123,12 @@ class Eyes:
 
 
 def obstacles_of(found: list[tuple]) -> Obstacles:
-    """Gather obstacles found one by one: unit, point, ee_distance, body_point, link, direction, body_distance."""
-    unit, point, ee_distance, body_point, link, direction, distance = zip(*found, strict=True) if found else [()] * 7
+    """Gather obstacles one by one: unit, age, point, ee_distance, body_point, link, direction, body_distance."""
+    unit, age, point, ee_distance, body_point, link, direction, distance = (
+        zip(*found, strict=True) if found else [()] * 8
+    )
     return Obstacles(
         np.array(unit, dtype=np.int64), np.reshape(point, (-1, 3)), np.array(ee_distance),
         np.reshape(body_point, (-1, 3)), np.array(link, dtype=np.int64), np.reshape(direction, (-1, 3)),
-        np.array(distance), np.zeros(len(unit)),
+        np.array(distance), np.zeros(len(unit)), np.array(unit, dtype=np.int64), np.array(age),
     )  # fmt: skip

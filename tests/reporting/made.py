@@ -21,12 +21,12 @@ from pretouch.types import (
     ControlStep,
     Inputs,
     Mode,
-    Obstacles,
     QpOutcome,
     QpSolution,
     RangeReadings,
     RobotState,
     Thresholds,
+    no_obstacles,
 )
 
 
@@ -95,10 +95,10 @@ def seen(model, points):
     count = len(points)
     unit, link, body, ee = (np.array(c) for c in zip(*points, strict=True)) if points else ((),) * 4
     place = np.tile([0.5, 0.0, 0.5], (count, 1))
-    return Obstacles(
-        np.array(unit, dtype=np.int64), place, np.array(ee, dtype=float), place,
-        np.array([model.link_index(name) for name in link], dtype=np.int64), place, np.array(body, dtype=float),
-        np.zeros(len(unit)),
+    return no_obstacles(count)._replace(
+        unit=np.array(unit, dtype=np.int64), point=place, ee_distance=np.array(ee, dtype=float), body_point=place,
+        link=np.array([model.link_index(name) for name in link], dtype=np.int64), direction=place,
+        body_distance=np.array(body, dtype=float),
     )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from pretouch.control.joint_box import joint_limits
 from pretouch.errors import ParameterError
 from pretouch.perception.closest import closest_points
 from pretouch.profiles import profile
-from pretouch.types import Obstacles, QpOutcome, RobotState
+from pretouch.types import QpOutcome, RobotState, no_obstacles
 from pretouch_lab.baselines.ding import Ding
 from pretouch_lab.baselines.flacco import Flacco
 
@@ -21,8 +21,8 @@ def obstacles_at(points, ee=(0.0, 0.0, 0.0)):
     points = np.array(points, float).reshape(-1, 3)
     away = points - np.array(ee)
     far = np.linalg.norm(away, axis=1)
-    k = len(points)
-    return Obstacles(np.arange(k), points, far, points * 0, np.ones(k, np.int64), away / far[:, None], far, np.zeros(k))
+    near = no_obstacles(len(points))._replace(point=points, ee_distance=far, link=np.ones(len(points), np.int64))
+    return near._replace(direction=away / far[:, None], body_distance=far)
 
 
 def test_repulsion_by_numbers_is_finite_anywhere():

@@ -34,7 +34,9 @@ def closest_points(
         point: (K, 3) obstacles, base frame [m].
         last_direction: (K, 3) unit vectors for points on an axis.
     """
-    near = no_obstacles(len(point))._replace(unit=unit, point=point, direction=last_direction.astype(np.float64))
+    near = no_obstacles(len(point))._replace(
+        unit=unit, slot=unit, point=point, direction=last_direction.astype(np.float64)
+    )
     closest(placed(body, kin), near)
     return near._replace(ee_distance=np.linalg.norm(point - ee_position, axis=1))
 

@@ -89,14 +89,18 @@ def take_points(
         source_stamp[0] = -np.inf
     if not source_stamp[0] < new.heard <= now:
         return
-    source_stamp[0], velocity, units = new.heard, np.zeros(3), len(sight.late)
-    for m in range(places.number[0]):
-        if places.unit[m] >= units:  # the source has answered: its silence keeps no point any more
-            places.until[m] = min(places.until[m], places.seen[m] + p.persistence_s)
+    source_stamp[0], still, units, count = new.heard, np.zeros(3), len(sight.late), places.number[0]
+    seen = np.where(places.unit[:count] >= units, places.seen[:count], -np.inf)
+    before = places.place[:count].copy(), places.velocity[:count].copy(), seen
     # the arm at the measurement of the points: it may have moved by more than the margin since; the whole arm explains
     # points, the base too, while only moving links have obstacles
     here, moved_to = placed(sight.arm, kin), np.inf
     arm = Capsules(here.link, np.empty_like(here.a), np.empty_like(here.b), here.radius)
+    for m in range(count):
+        if places.unit[m] >= units:  # the source has answered: its silence keeps no point any more
+            hidden = _gap(places.place, m, here) <= p.margin_m + places.spread[m]
+            life = max(p.persistence_s, p.hidden_s) if hidden else p.persistence_s
+            places.until[m] = min(places.until[m], places.seen[m] + life)
     index = index_of(places, sight.memory.cell_m)
     for m in range(len(new.stamp)):
         stamp, sigma = new.stamp[m], new.sigma[m]
@@ -112,30 +116,34 @@ def take_points(
         if gap_to(new.point, m, fixtures) <= p.margin_m + u or _on_planes(new.point, m, sight.planes, p.margin_m + u):
             continue
         # of the points in one cell the nearest to the arm is remembered: it has the least width
-        look = Look(stamp, (p.silent_after_s, p.silent_after_s), _FOOTPRINT * gap, u, units)
-        _follow(places, look, new.point[m], sight.memory.closing_s, velocity)
-        remember(places, index, new.point[m], velocity, look, sight.memory)
+        look = Look(stamp, (p.silent_after_s, p.silent_after_s), _FOOTPRINT * (gap - u), u, units)
+        remember(places, index, new.point[m], still, look, sight.memory)
+    _follow(places, before, units, sight.memory.closing_s)
 
 
 @kernel
-def _follow(places: LocalMap, look: Look, point: FloatArray, memory: float, velocity: FloatArray) -> None:
-    """Write the velocity (3,) [m/s] of an outside point (3,): that of the nearest earlier one, corrected by the move.
+def _follow(places: LocalMap, before: tuple[FloatArray, FloatArray, FloatArray], units: int, memory: float) -> None:
+    """Write the velocities of new outside points: that of the nearest earlier place, corrected by the move from there.
 
-    The correction is that of `follow_points`; a point without an earlier one nearby has velocity 0.
+    `before` are places, velocities and stamps before the new points, -inf for what units saw. The correction has the mean delay of
+    `follow_points`; a point without an earlier place nearby has velocity 0.
     """
-    velocity[:], nearest, least = 0.0, -1, np.inf
+    place, velocity, seen = before
     for m in range(places.number[0]):
-        dt = look.stamp - places.seen[m]
-        if places.unit[m] >= look.unit and 0.0 < dt <= 3.0 * memory:
-            apart = separation(places.place, m, point)
-            if apart < least and apart < FASTEST * dt + JUMP_M:
-                nearest, least = m, apart
-    if nearest >= 0:
-        dt = look.stamp - places.seen[nearest]
-        gain = (1.0 - np.exp(-dt / memory)) ** 2 / dt
-        for i in range(3):
-            last = places.velocity[nearest, i]
-            velocity[i] = last + gain * (point[i] - places.place[nearest, i] - dt * last)
+        if places.unit[m] < units or (m < len(seen) and places.seen[m] == seen[m]):
+            continue
+        nearest, least = -1, np.inf
+        for b in range(len(seen)):
+            dt = places.seen[m] - seen[b]
+            apart = separation(place, b, places.place[m])
+            if 0.0 < dt <= 3.0 * memory and apart < min(least, FASTEST * dt + JUMP_M):
+                nearest, least = b, apart
+        if nearest >= 0:
+            dt = places.seen[m] - seen[nearest]
+            gain = 1.0 - np.exp(-dt / (2.0 * memory))
+            for i in range(3):
+                last = velocity[nearest, i]
+                places.velocity[m, i] = last + gain * ((places.place[m, i] - place[nearest, i]) / dt - last)
 
 
 @kernel

@@ -156,23 +156,26 @@ def replace_wider(places: LocalMap, at: FloatArray, stamp: float, width: float) 
 
 
 @inlined
-def carve(places: LocalMap, sensors: Sensors, first: IntArray, cones: Cones, free: FloatArray, within: float) -> None:
-    """Take a look off each place that a unit sees empty.
+def carve(
+    places: LocalMap, sensors: Sensors, first: IntArray, cones: Cones, looks: tuple[FloatArray, FloatArray], most: float
+) -> None:
+    """Take a look off each place that a unit sees empty after it was last seen.
 
     Each place is looked up in the zone that looks at it. `first` (B + 1,) is the first zone of each mounted unit, and
-    the number of zones; `free` (K,) [m] is the distance up to which nothing is along the beam of each, -inf where
-    nothing is told; places beyond `within` [m] stay.
+    the number of zones; `looks` are the stamp of each zone's (K,) [s], and the distance (K,) [m] up to which nothing
+    is along its beam, -inf where nothing is told; places beyond `most` [m] stay.
     """
-    position, rotation = sensors.position, sensors.rotation
+    position, rotation, (stamp, end) = sensors.position, sensors.rotation, looks
     middle, to = np.empty(3), np.empty(3)
     for b in range(len(first) - 1):
-        k0, k1, most = first[b], first[b + 1], -np.inf
+        k0, k1, farthest = first[b], first[b + 1], first[b]
         middle[:] = 0.0
         for k in range(k0, k1):
-            most = max(most, free[k])
+            if end[k] > end[farthest]:
+                farthest = k
             for i in range(3):
                 middle[i] += rotation[k, i, 2]
-        if not most > 0.0:
+        if not end[farthest] > 0.0:
             continue
         length = math.sqrt(dot(middle, middle))
         # the edge of the whole field: of the outermost zone, and half of that zone
@@ -183,16 +186,16 @@ def carve(places: LocalMap, sensors: Sensors, first: IntArray, cones: Cones, fre
         widest = aside * edge[0] - math.sqrt(max(0.0, 1.0 - aside * aside)) * edge[1]
         for m in range(places.number[0]):
             for i in range(3):
-                to[i] = places.place[m, i] - position[k0, i]
+                to[i] = places.place[m, i] - position[farthest, i]
             away = math.sqrt(dot(to, to))
-            if away > min(most, within) or dot(to, middle) < widest * length * away:
+            if away > min(end[farthest], most) or dot(to, middle) < widest * length * away:
                 continue
             best, at = -np.inf, k0
             for k in range(k0, k1):
                 along = to[0] * rotation[k, 0, 2] + to[1] * rotation[k, 1, 2] + to[2] * rotation[k, 2, 2]
                 if along > best:
                     best, at = along, k
-            if away < free[at] and best > edge[0] * away:
+            if away < end[at] and best > edge[0] * away and places.seen[m] < stamp[at]:
                 places.looks[m] = max(0, places.looks[m] - 1)
 
 

@@ -181,7 +181,7 @@ def _remember_readings(
         elif young[k] and stamp[k] - tracks.target_stamp[k] > cones.timing[cones.kind[k], 0]:
             # no target for longer than a burst of a sensor that misses one
             free[k] = cones.range[cones.kind[k], 1]
-    carve(places, sensors, sight.skin.first, cones, free, p.carve_m)
+    carve(places, sensors, sight.skin.first, cones, (stamp, free), p.carve_m)
     index = index_of(places, p.cell_m)
     for k in range(len(stamp)):
         if not (young[k] and shows[k] and distance[k] <= p.mark_m):
