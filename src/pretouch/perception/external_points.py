@@ -125,8 +125,8 @@ def take_points(
 def _follow(places: LocalMap, before: tuple[FloatArray, FloatArray, FloatArray], units: int, memory: float) -> None:
     """Write the velocities of new outside points: that of the nearest earlier place, corrected by the move from there.
 
-    `before` are places, velocities and stamps before the new points, -inf for what units saw. The correction has the mean delay of
-    `follow_points`; a point without an earlier place nearby has velocity 0.
+    `before` are places, velocities and stamps before the new points, -inf for what units saw. The correction has the
+    mean delay of `follow_points`; a point without an earlier place nearby has velocity 0.
     """
     place, velocity, seen = before
     for m in range(places.number[0]):

@@ -155,6 +155,22 @@ def replace_wider(places: LocalMap, at: FloatArray, stamp: float, width: float) 
             places.looks[m] = max(0, places.looks[m] - 1)
 
 
+@kernel
+def confirm(places: LocalMap, position: FloatArray, beam: FloatArray, reach: float, look: Look) -> bool:
+    """Note a look at something nearer than a sensor measures: at the places within `reach` [m] ahead of it.
+
+    `position` (3,) [m] and `beam` (3,) are the sensor's. Return whether there is such a place.
+    """
+    known, to = False, np.empty(3)
+    for m in range(places.number[0]):
+        for i in range(3):
+            to[i] = places.place[m, i] - position[i]
+        if places.looks[m] > 0 and dot(to, to) < reach * reach and dot(to, beam) > 0.0:
+            places.seen[m], known = max(places.seen[m], look.stamp), True
+            places.until[m] = max(places.until[m], look.stamp + look.lasts[1])
+    return known
+
+
 @inlined
 def carve(
     places: LocalMap, sensors: Sensors, first: IntArray, cones: Cones, looks: tuple[FloatArray, FloatArray], most: float

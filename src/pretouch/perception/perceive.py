@@ -6,7 +6,16 @@ import numpy as np
 
 from pretouch.compiled import inlined, kernel
 from pretouch.perception.closest import closest
-from pretouch.perception.local_map import LocalMap, Look, carve, index_of, nearest_places, remember, replace_wider
+from pretouch.perception.local_map import (
+    LocalMap,
+    Look,
+    carve,
+    confirm,
+    index_of,
+    nearest_places,
+    remember,
+    replace_wider,
+)
 from pretouch.perception.motion_compensation import follow_points, move_back
 from pretouch.perception.obstacles import (
     Sight,
@@ -193,5 +202,9 @@ def _remember_readings(
         turned = np.sqrt(sight.skin.orientation_sigma[k] ** 2 + cones.spread[kind] ** 2)
         u = spread(sight.sigmas, sight.skin.position_sigma[k], turned, distance[k])
         width = distance[k] * cones.edge[kind, 2]
-        replace_wider(places, at, stamp[k], width)
-        remember(places, index, at, velocity, Look(stamp[k], (lives[k], p.kept_s), width, u, k), p)
+        look, least = Look(stamp[k], (lives[k], p.kept_s), width, u, k), cones.range[kind, 0]
+        beam = sensors.rotation[k, :, 2]
+        # a target at the minimum may be anywhere before it: it is where it was seen before
+        if distance[k] > least or not confirm(places, sensors.position[k], beam, least + p.fist_m, look):
+            replace_wider(places, at, stamp[k], width)
+            remember(places, index, at, velocity, look, p)
