@@ -126,7 +126,8 @@ class Controller:
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
         same_window = mine.window.samples == theirs.window.samples and type(mine.detect) is type(theirs.detect)
         same_slots = self.slots == before.slots and self.remembers == before.remembers
-        parts = ["watch", "tracks", "pace", "command", "rotation_goal", "places", "source_stamp"]
+        same_map = self.remembers and before.remembers
+        parts = ["watch", "tracks", "pace", "command", "rotation_goal"] + ["places", "source_stamp"] * same_map
         parts += ["window"] * same_window + ["null_velocity"] * (mine.null_space == theirs.null_space)
         parts += ["mass"] * (type(mine.react) is type(theirs.react))
         memory.take(remembered, parts + ["slots"] * (mine.approach == theirs.approach and same_slots))

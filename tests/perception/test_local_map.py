@@ -165,9 +165,9 @@ def test_no_target_counts_after_the_longest_burst_of_its_sensor(panda_model, uni
     counts = [len(looker.look(now, None).unit) for now in frames]
     in_burst = [count for now, count in zip(frames, counts, strict=True) if now - last <= sensor.blind_s]
     assert in_burst == [there] * len(in_burst)
-    # and then three looks
-    assert counts[len(in_burst) + 1] > 0
-    assert counts[len(in_burst) + 2] == 0
+    # one more, for the burst begins with the first of them, and then three looks
+    assert counts[len(in_burst) + 2] > 0
+    assert counts[len(in_burst) + 3] == 0
 
 
 def test_a_late_reading_says_nothing_of_what_was_seen_after_it(panda_model, unit):

@@ -115,7 +115,7 @@ def test_what_is_remembered_of_a_unit_after_readings(readings, seen, used, heard
     state = track_init(1)
     for stamp, now, (shows, tells) in readings:
         state = _take(state, stamp, now, x=stamp, shows=shows, tells=tells)  # the point tells its stamp
-    stamps = state.point_stamp, state.target_stamp, state.reading_stamp, state.report_stamp
+    stamps = state.point_stamp, state.reading_stamp, state.report_stamp
     assert stamps == (seen, seen, used, heard)
     np.testing.assert_array_equal(state.point, [[NAN] * 3 if seen == -INF else [seen, 0.0, 0.0]])
 

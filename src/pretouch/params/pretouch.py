@@ -251,7 +251,7 @@ class BrakingParams(Checked):
     """Touch speed by the arm's mass; none: it is `touch_speed_max_m_s`."""
     closing_deadband_m_s: NonNegative | None = None
     """Closing speed of the object itself that does not count [m/s]; more of it lowers the approach limit, which needs
-    `perception.closing`. Range noise of 20 mm leaves 0.05 in the estimate for an object at rest. None: the object's own
+    `perception.memory`. Range noise of 20 mm leaves 0.05 in the estimate for an object at rest. None: the object's own
     speed does not count."""
     tangential: Tangential | None = None
     """Limit on the speed across the normal near an object; none: no limit."""

@@ -89,16 +89,16 @@ def take_points(
         source_stamp[0] = -np.inf
     if not source_stamp[0] < new.heard <= now:
         return
-    source_stamp[0], still, units, count = new.heard, np.zeros(3), len(sight.late), places.number[0]
-    seen = np.where(places.unit[:count] >= units, places.seen[:count], -np.inf)
+    source_stamp[0], still, count = new.heard, np.zeros(3), places.number[0]
+    seen = np.where(places.unit[:count] < 0, places.seen[:count], -np.inf)
     before = places.place[:count].copy(), places.velocity[:count].copy(), seen
     # the arm at the measurement of the points: it may have moved by more than the margin since; the whole arm explains
     # points, the base too, while only moving links have obstacles
     here, moved_to = placed(sight.arm, kin), np.inf
     arm = Capsules(here.link, np.empty_like(here.a), np.empty_like(here.b), here.radius)
     for m in range(count):
-        if places.unit[m] >= units:  # the source has answered: its silence keeps no point any more
-            hidden = _gap(places.place, m, here) <= p.margin_m + places.spread[m]
+        if places.unit[m] < 0:  # the source has answered: its silence keeps no point any more
+            hidden = gap_to(places.place, m, here) <= p.margin_m + places.spread[m]
             life = max(p.persistence_s, p.hidden_s) if hidden else p.persistence_s
             places.until[m] = min(places.until[m], places.seen[m] + life)
     index = index_of(places, sight.memory.cell_m)
@@ -116,13 +116,13 @@ def take_points(
         if gap_to(new.point, m, fixtures) <= p.margin_m + u or _on_planes(new.point, m, sight.planes, p.margin_m + u):
             continue
         # of the points in one cell the nearest to the arm is remembered: it has the least width
-        look = Look(stamp, (p.silent_after_s, p.silent_after_s), _FOOTPRINT * (gap - u), u, units)
+        look = Look(stamp, (p.silent_after_s, p.silent_after_s), _FOOTPRINT * (gap - u), u, -1)
         remember(places, index, new.point[m], still, look, sight.memory)
-    _follow(places, before, units, sight.memory.closing_s)
+    _follow(places, before, sight.memory.closing_s)
 
 
 @kernel
-def _follow(places: LocalMap, before: tuple[FloatArray, FloatArray, FloatArray], units: int, memory: float) -> None:
+def _follow(places: LocalMap, before: tuple[FloatArray, FloatArray, FloatArray], memory: float) -> None:
     """Write the velocities of new outside points: that of the nearest earlier place, corrected by the move from there.
 
     `before` are places, velocities and stamps before the new points, -inf for what units saw. The correction has the
@@ -130,7 +130,7 @@ def _follow(places: LocalMap, before: tuple[FloatArray, FloatArray, FloatArray],
     """
     place, velocity, seen = before
     for m in range(places.number[0]):
-        if places.unit[m] < units or (m < len(seen) and places.seen[m] == seen[m]):
+        if places.unit[m] >= 0 or (m < len(seen) and places.seen[m] == seen[m]):
             continue
         nearest, least = -1, np.inf
         for b in range(len(seen)):

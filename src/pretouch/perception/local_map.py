@@ -49,8 +49,10 @@ class LocalMap(NamedTuple):
     """(N,) uncertainty of the place [m]."""
     looks: Annotated[IntArray, "N"]
     """(N,) looks that count for it."""
+    empty_since: Annotated[FloatArray, "N"]
+    """(N,) stamp of the first look after that which saw it empty, infinite without one [s]."""
     unit: Annotated[IntArray, "N"]
-    """(N,) index of the unit that saw it last; outside points have the number of units."""
+    """(N,) index of the unit that saw it last; -1: outside sources."""
 
 
 def map_init(room: int) -> LocalMap:
@@ -118,7 +120,8 @@ def remember(
     cell = cell_of(look.width, p.cell_m)
     m = index.first[_bucket(at[0], at[1], at[2], cell)]
     while m >= 0:
-        same = cell_of(places.width[m], p.cell_m) == cell
+        # an outside source that no longer shows a place forgets none of a unit's
+        same = cell_of(places.width[m], p.cell_m) == cell and (places.unit[m] < 0) == (look.unit < 0)
         for i in range(3):
             same = same and math.floor(places.place[m, i] / cell) == math.floor(at[i] / cell)
         if same:
@@ -132,7 +135,7 @@ def remember(
             return
         m = places.number[0]
         places.number[0] += 1
-        places.looks[m], places.seen[m], places.width[m] = 0, -np.inf, look.width
+        places.looks[m], places.seen[m], places.width[m], places.unit[m] = 0, -np.inf, look.width, look.unit
         for i in range(3):
             places.place[m, i] = at[i]
         _link(places, index, m, p.cell_m)
@@ -142,6 +145,7 @@ def remember(
         places.looks[m] = min(p.looks, places.looks[m] + 1)
     places.seen[m], places.width[m], places.spread[m] = look.stamp, look.width, look.spread
     places.until[m], places.unit[m] = look.stamp + look.lasts[min(places.looks[m], 2) - 1], look.unit
+    places.empty_since[m] = np.inf
     for i in range(3):
         places.place[m, i], places.velocity[m, i] = at[i], velocity[i]
 
@@ -167,21 +171,23 @@ def confirm(places: LocalMap, position: FloatArray, beam: FloatArray, reach: flo
             to[i] = places.place[m, i] - position[i]
         if places.looks[m] > 0 and dot(to, to) < reach * reach and dot(to, beam) > 0.0:
             places.seen[m], known = max(places.seen[m], look.stamp), True
-            places.until[m] = max(places.until[m], look.stamp + look.lasts[1])
+            places.until[m], places.empty_since[m] = max(places.until[m], look.stamp + look.lasts[1]), np.inf
     return known
 
 
 @inlined
 def carve(
-    places: LocalMap, sensors: Sensors, first: IntArray, cones: Cones, looks: tuple[FloatArray, FloatArray], most: float
-) -> None:
+    places: LocalMap, sensors: Sensors, first: IntArray, cones: Cones,
+    looks: tuple[FloatArray, FloatArray, FloatArray], most: float,
+) -> None:  # fmt: skip
     """Take a look off each place that a unit sees empty after it was last seen.
 
     Each place is looked up in the zone that looks at it. `first` (B + 1,) is the first zone of each mounted unit, and
-    the number of zones; `looks` are the stamp of each zone's (K,) [s], and the distance (K,) [m] up to which nothing
-    is along its beam, -inf where nothing is told; places beyond `most` [m] stay.
+    the number of zones; `looks` are the stamp of each zone's (K,) [s], the distance (K,) [m] up to which nothing is
+    along its beam, -inf where nothing is told, and the time (K,) [s] for which a place must be seen so before that
+    counts; places beyond `most` [m] stay.
     """
-    position, rotation, (stamp, end) = sensors.position, sensors.rotation, looks
+    position, rotation, (stamp, end, wait) = sensors.position, sensors.rotation, looks
     middle, to = np.empty(3), np.empty(3)
     for b in range(len(first) - 1):
         k0, k1, farthest = first[b], first[b + 1], first[b]
@@ -200,6 +206,8 @@ def carve(
             aside = min(aside, dot(middle, rotation[k, :, 2]) / length)
         edge = cones.edge[cones.kind[k0]]
         widest = aside * edge[0] - math.sqrt(max(0.0, 1.0 - aside * aside)) * edge[1]
+        # a single cone misses at its edge what fills little of it: half of the cone sees a place empty
+        inside = edge[0] if k1 - k0 > 1 else math.sqrt((1.0 + edge[0]) / 2.0)
         for m in range(places.number[0]):
             for i in range(3):
                 to[i] = places.place[m, i] - position[farthest, i]
@@ -211,8 +219,10 @@ def carve(
                 along = to[0] * rotation[k, 0, 2] + to[1] * rotation[k, 1, 2] + to[2] * rotation[k, 2, 2]
                 if along > best:
                     best, at = along, k
-            if away < end[at] and best > edge[0] * away and places.seen[m] < stamp[at]:
-                places.looks[m] = max(0, places.looks[m] - 1)
+            if away < end[at] and best > inside * away and places.seen[m] < stamp[at]:
+                places.empty_since[m] = min(places.empty_since[m], stamp[at])
+                if stamp[at] - places.empty_since[m] >= wait[at]:
+                    places.looks[m] = max(0, places.looks[m] - 1)
 
 
 @kernel
@@ -228,6 +238,7 @@ def forget(places: LocalMap, now: float) -> None:
             places.place[m, i], places.velocity[m, i] = places.place[last, i], places.velocity[last, i]
         places.seen[m], places.until[m], places.looks[m] = places.seen[last], places.until[last], places.looks[last]
         places.width[m], places.spread[m], places.unit[m] = places.width[last], places.spread[last], places.unit[last]
+        places.empty_since[m] = places.empty_since[last]
         places.number[0] = last
 
 
@@ -244,8 +255,8 @@ def nearest_places(
             (3,) [m].
         now: instant of the step [s].
         p: parameters.
-        outside: of outside points: their unit, the distance from the body up to which no source can show one [m], and
-            their lives elsewhere and there [s].
+        outside: of outside points: `Obstacles.unit`, the distance from the body up to which no source can show one
+            [m], and their lives elsewhere and there [s].
         room: for the obstacles.
 
     Returns the number of obstacles.
@@ -262,7 +273,7 @@ def nearest_places(
             places.looks[m] = 0
             continue
         distance[m] -= places.spread[m]
-        if places.unit[m] < units:
+        if places.unit[m] >= 0:
             distance[m] -= p.fist_m
         elif distance[m] <= hidden_m:
             places.until[m] = max(places.until[m], min(now + lives[0], places.seen[m] + lives[1]))
@@ -282,8 +293,9 @@ def nearest_places(
     for slot in range(len(chosen)):
         m = chosen[slot]
         if m >= 0:
-            radius = p.fist_m if places.unit[m] < units else 0.0
+            radius = p.fist_m if places.unit[m] >= 0 else 0.0
             _write(places, near, m, now, radius, some_of(room, obstacles, obstacles + 1))
+            room.unit[obstacles] = places.unit[m] if places.unit[m] >= 0 else units
             room.ee_distance[obstacles] = max(0.0, separation(room.point, obstacles, ee) - places.spread[m])
             room.slot[obstacles] = slot
             obstacles += 1
@@ -293,7 +305,7 @@ def nearest_places(
 @kernel
 def _write(places: LocalMap, near: Obstacles, m: int, now: float, radius: float, room: Obstacles) -> None:
     """Write place m, a ball of a radius [m], as the obstacle."""
-    room.unit[0], room.link[0], room.body_distance[0] = places.unit[m], near.link[m], near.body_distance[m]
+    room.link[0], room.body_distance[0] = near.link[m], near.body_distance[m]
     room.age[0], speed = now - places.seen[m], 0.0
     for i in range(3):
         room.point[0, i] = near.point[m, i] - radius * near.direction[m, i]

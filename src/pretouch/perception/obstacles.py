@@ -53,8 +53,6 @@ class TrackState(NamedTuple):
     """(K,) stamp of the newest reading that was used [s]."""
     report_stamp: Annotated[FloatArray, "K"]
     """(K,) stamp of the newest reading with information, see `is_informative` [s]."""
-    target_stamp: Annotated[FloatArray, "K"]
-    """(K,) stamp of the newest reading that showed a target [s]."""
     motion: Annotated[FloatArray, 2, "K", 3]
     """(2, K, 3) smoothed position [m] and velocity [m/s] of each point, where places are remembered."""
 
@@ -62,7 +60,7 @@ class TrackState(NamedTuple):
 def track_init(units: int) -> TrackState:
     """Return the state before any reading."""
     never, nowhere = np.full(units, -np.inf), np.full((2, units, 3), np.nan)
-    return TrackState(nowhere[0].copy(), never, never.copy(), never.copy(), never.copy(), nowhere)
+    return TrackState(nowhere[0].copy(), never, never.copy(), never.copy(), nowhere)
 
 
 def points_of_units(obstacles: Obstacles, units: int) -> FloatArray:
@@ -152,10 +150,9 @@ def is_informative(distance: FloatArray, status: IntArray, target: FloatArray, c
 
 @kernel
 def update_tracks(
-    tracks: TrackState, stamp: FloatArray, points: FloatArray, flags: tuple[BoolArray, BoolArray, BoolArray],
-    target: FloatArray,
-) -> None:  # fmt: skip
-    """Update the tracks by readings (K,) of `stamp` [s] with points (K, 3) and the distances of targets (K,) [m].
+    tracks: TrackState, stamp: FloatArray, points: FloatArray, flags: tuple[BoolArray, BoolArray, BoolArray]
+) -> None:
+    """Update the tracks by readings (K,) of `stamp` [s] with points (K, 3) [m].
 
     `flags` (K,) mark readings that are fresh, that show an obstacle and are young enough, and that are informative. A
     reading with an obstacle replaces its unit's point. One without, or a late one, does not change the point, so a
@@ -168,8 +165,6 @@ def update_tracks(
             tracks.reading_stamp[k] = stamp[k]
             if informative[k]:
                 tracks.report_stamp[k] = stamp[k]
-            if not np.isnan(target[k]):
-                tracks.target_stamp[k] = stamp[k]
             if shows[k]:
                 tracks.point_stamp[k] = stamp[k]
                 for i in range(3):

@@ -169,7 +169,7 @@ def _take_readings(
         follow_points(tracks, points, stamp, fresh & shows, sight.memory.closing_s)
         young = fresh & informative & (now - stamp <= lives)
         _remember_readings(sight, memory, stamp, distance, (young, shows), (sensors, points), lives)
-    update_tracks(tracks, stamp, points, (fresh, shows, informative), distance)
+    update_tracks(tracks, stamp, points, (fresh, shows, informative))
 
 
 @inlined
@@ -183,14 +183,14 @@ def _remember_readings(
     their measurements, and the points (K, 3) [m].
     """
     (tracks, places), (young, shows), (sensors, points), p = memory, flags, seen, sight.memory
-    cones, free, at = sight.skin.cones, np.full(len(stamp), -np.inf), np.empty(3)
+    cones, free, wait, at = sight.skin.cones, np.full(len(stamp), -np.inf), np.zeros(len(stamp)), np.empty(3)
     for k in range(len(stamp)):
         if young[k] and not np.isnan(distance[k]):
             free[k] = distance[k] + p.fist_m - (p.tolerance_m if shows[k] else sight.margin_m)
-        elif young[k] and stamp[k] - tracks.target_stamp[k] > cones.timing[cones.kind[k], 0]:
-            # no target for longer than a burst of a sensor that misses one
-            free[k] = cones.range[cones.kind[k], 1]
-    carve(places, sensors, sight.skin.first, cones, (stamp, free), p.carve_m)
+        elif young[k]:
+            # no target: that has to last longer than a burst of a sensor that misses one
+            free[k], wait[k] = cones.range[cones.kind[k], 1], cones.timing[cones.kind[k], 0]
+    carve(places, sensors, sight.skin.first, cones, (stamp, free, wait), p.carve_m)
     index = index_of(places, p.cell_m)
     for k in range(len(stamp)):
         if not (young[k] and shows[k] and distance[k] <= p.mark_m):
