@@ -9,7 +9,7 @@ import numpy as np
 
 from pretouch.compiled import compiled, kernel
 from pretouch.params import OutsidePoints
-from pretouch.perception.local_map import LocalMap, Look, index_of, remember
+from pretouch.perception.local_map import LocalMap, Look, remember
 from pretouch.perception.motion_compensation import FASTEST, JUMP_M
 from pretouch.perception.obstacles import Sight, speed_factor
 from pretouch.robot.body import Capsules, gap_to, placed
@@ -101,7 +101,6 @@ def take_points(
             hidden = gap_to(places.place, m, here) <= p.margin_m + places.spread[m]
             life = max(p.persistence_s, p.hidden_s) if hidden else p.persistence_s
             places.until[m] = min(places.until[m], places.seen[m] + life)
-    index = index_of(places, sight.memory.cell_m)
     for m in range(len(new.stamp)):
         stamp, sigma = new.stamp[m], new.sigma[m]
         if not (_is_point(stamp, new.point, m, sigma) and 0.0 <= now - stamp <= p.persistence_s):
@@ -117,7 +116,7 @@ def take_points(
             continue
         # of the points in one cell the nearest to the arm is remembered: it has the least width
         look = Look(stamp, (p.silent_after_s, p.silent_after_s), _FOOTPRINT * (gap - u), u, -1)
-        remember(places, index, new.point[m], still, look, sight.memory)
+        remember(places, new.point[m], still, look, sight.memory)
     _follow(places, before, sight.memory.closing_s)
 
 

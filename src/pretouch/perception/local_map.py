@@ -22,7 +22,6 @@ from pretouch.types import FloatArray, IntArray, Obstacles, no_obstacles, some_o
 
 MOST_PLACES = 512
 """Places that the map has room for; then the oldest go."""
-_BUCKETS = 1024
 _WIDE_M = 0.03
 """Half a footprint [m] up to which a look has the smallest cells; up to twice that they are twice as large."""
 _APART = math.cos(math.radians(30.0))
@@ -47,6 +46,8 @@ class LocalMap(NamedTuple):
     """(N,) half the width of the look's footprint [m]."""
     spread: Annotated[FloatArray, "N"]
     """(N,) uncertainty of the place [m]."""
+    cell: Annotated[IntArray, "N"]
+    """(N,) its cell, see `cell_number`."""
     looks: Annotated[IntArray, "N"]
     """(N,) looks that count for it."""
     empty_since: Annotated[FloatArray, "N"]
@@ -75,70 +76,33 @@ class Look(NamedTuple):
     """See `LocalMap.unit`."""
 
 
-class CellIndex(NamedTuple):
-    """Places by their cells, while looks are taken: chains of places with the same hash."""
+@kernel
+def cell_number(at: FloatArray, width: float, smallest: float, outside: bool) -> int:
+    """Return a number for the cell around a point (3,) [m], of a look with half a footprint `width` [m].
 
-    first: IntArray
-    """(B,) first place of each chain, -1 for none."""
-    following: IntArray
-    """(N,) the next place of the chain, -1 for none."""
+    Outside sources have cells of their own: what they no longer show, units may still remember.
+    """
+    level = 0 if width < _WIDE_M else 1 if width < 2.0 * _WIDE_M else 2
+    number = 2 * level + (1 if outside else 0)
+    for i in range(3):
+        number = (number << 20) + (math.floor(at[i] / (smallest * (1 << level))) & 0xFFFFF)
+    return number
 
 
 @kernel
-def _bucket(x: float, y: float, z: float, cell: float) -> int:
-    i, j, k = math.floor(x / cell), math.floor(y / cell), math.floor(z / cell)
-    return (i * 73856093 ^ j * 19349663 ^ k * 83492791) & (_BUCKETS - 1)
-
-
-@kernel
-def cell_of(width: float, smallest: float) -> float:
-    """Return the edge of the cells for a look of a width [m]."""
-    return smallest * (1.0 if width < _WIDE_M else 2.0 if width < 2.0 * _WIDE_M else 4.0)
-
-
-@kernel
-def index_of(places: LocalMap, smallest: float) -> CellIndex:
-    """Return the places by their cells."""
-    index = CellIndex(np.full(_BUCKETS, -1, np.int64), np.full(len(places.seen), -1, np.int64))
-    for m in range(places.number[0]):
-        _link(places, index, m, smallest)
-    return index
-
-
-@kernel
-def _link(places: LocalMap, index: CellIndex, m: int, smallest: float) -> None:
-    at = places.place[m]
-    b = _bucket(at[0], at[1], at[2], cell_of(places.width[m], smallest))
-    index.following[m], index.first[b] = index.first[b], m
-
-
-@kernel
-def remember(
-    places: LocalMap, index: CellIndex, at: FloatArray, velocity: FloatArray, look: Look, p: LocalMapParams
-) -> None:
+def remember(places: LocalMap, at: FloatArray, velocity: FloatArray, look: Look, p: LocalMapParams) -> None:
     """Add a look at a place (3,) [m] of an object with a velocity (3,) [m/s]."""
-    cell = cell_of(look.width, p.cell_m)
-    m = index.first[_bucket(at[0], at[1], at[2], cell)]
-    while m >= 0:
-        # an outside source that no longer shows a place forgets none of a unit's
-        same = cell_of(places.width[m], p.cell_m) == cell and (places.unit[m] < 0) == (look.unit < 0)
-        for i in range(3):
-            same = same and math.floor(places.place[m, i] / cell) == math.floor(at[i] / cell)
-        if same:
-            break
-        m = index.following[m]
-    if m < 0:
-        if places.number[0] == len(places.seen):
+    cell, m = cell_number(at, look.width, p.cell_m, look.unit < 0), 0
+    while m < places.number[0] and places.cell[m] != cell:
+        m += 1
+    if m == places.number[0]:
+        if m == len(places.seen):
             oldest = places.seen.argmin()
             if places.seen[oldest] < look.stamp:  # it goes, and the next look finds room
                 places.looks[oldest], places.seen[oldest] = 0, np.inf
             return
-        m = places.number[0]
         places.number[0] += 1
-        places.looks[m], places.seen[m], places.width[m], places.unit[m] = 0, -np.inf, look.width, look.unit
-        for i in range(3):
-            places.place[m, i] = at[i]
-        _link(places, index, m, p.cell_m)
+        places.cell[m], places.looks[m], places.seen[m], places.width[m] = cell, 0, -np.inf, look.width
     if not (look.stamp > places.seen[m] or look.width < places.width[m]):
         return
     if look.stamp > places.seen[m]:
@@ -187,33 +151,20 @@ def carve(
     along its beam, -inf where nothing is told, and the time (K,) [s] for which a place must be seen so before that
     counts; places beyond `most` [m] stay.
     """
-    position, rotation, (stamp, end, wait) = sensors.position, sensors.rotation, looks
-    middle, to = np.empty(3), np.empty(3)
+    (position, rotation, _), (stamp, end, wait), to = sensors, looks, np.empty(3)
     for b in range(len(first) - 1):
         k0, k1, farthest = first[b], first[b + 1], first[b]
-        middle[:] = 0.0
         for k in range(k0, k1):
-            if end[k] > end[farthest]:
-                farthest = k
-            for i in range(3):
-                middle[i] += rotation[k, i, 2]
-        if not end[farthest] > 0.0:
-            continue
-        length = math.sqrt(dot(middle, middle))
-        # the edge of the whole field: of the outermost zone, and half of that zone
-        aside = 1.0
-        for k in range(k0, k1):
-            aside = min(aside, dot(middle, rotation[k, :, 2]) / length)
-        edge = cones.edge[cones.kind[k0]]
-        widest = aside * edge[0] - math.sqrt(max(0.0, 1.0 - aside * aside)) * edge[1]
+            farthest = k if end[k] > end[farthest] else farthest
         # a single cone misses at its edge what fills little of it: half of the cone sees a place empty
-        inside = edge[0] if k1 - k0 > 1 else math.sqrt((1.0 + edge[0]) / 2.0)
+        edge = cones.edge[cones.kind[k0], 0]
+        inside = edge if k1 - k0 > 1 else math.sqrt((1.0 + edge) / 2.0)
         for m in range(places.number[0]):
+            away = separation(places.place, m, position[farthest])
+            if not away < min(end[farthest], most):
+                continue
             for i in range(3):
                 to[i] = places.place[m, i] - position[farthest, i]
-            away = math.sqrt(dot(to, to))
-            if away > min(end[farthest], most) or dot(to, middle) < widest * length * away:
-                continue
             best, at = -np.inf, k0
             for k in range(k0, k1):
                 along = to[0] * rotation[k, 0, 2] + to[1] * rotation[k, 1, 2] + to[2] * rotation[k, 2, 2]
@@ -238,7 +189,7 @@ def forget(places: LocalMap, now: float) -> None:
             places.place[m, i], places.velocity[m, i] = places.place[last, i], places.velocity[last, i]
         places.seen[m], places.until[m], places.looks[m] = places.seen[last], places.until[last], places.looks[last]
         places.width[m], places.spread[m], places.unit[m] = places.width[last], places.spread[last], places.unit[last]
-        places.empty_since[m] = places.empty_since[last]
+        places.empty_since[m], places.cell[m] = places.empty_since[last], places.cell[last]
         places.number[0] = last
 
 

@@ -11,7 +11,6 @@ from pretouch.perception.local_map import (
     Look,
     carve,
     confirm,
-    index_of,
     nearest_places,
     remember,
     replace_wider,
@@ -191,7 +190,6 @@ def _remember_readings(
             # no target: that has to last longer than a burst of a sensor that misses one
             free[k], wait[k] = cones.range[cones.kind[k], 1], cones.timing[cones.kind[k], 0]
     carve(places, sensors, sight.skin.first, cones, (stamp, free, wait), p.carve_m)
-    index = index_of(places, p.cell_m)
     for k in range(len(stamp)):
         if not (young[k] and shows[k] and distance[k] <= p.mark_m):
             continue
@@ -207,4 +205,4 @@ def _remember_readings(
         # a target at the minimum may be anywhere before it: it is where it was seen before
         if distance[k] > least or not confirm(places, sensors.position[k], beam, least + p.fist_m, look):
             replace_wider(places, at, stamp[k], width)
-            remember(places, index, at, velocity, look, p)
+            remember(places, at, velocity, look, p)
