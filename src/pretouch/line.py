@@ -17,7 +17,7 @@ from pretouch.contact.sequential_step import assess_sample
 from pretouch.contact.virtual_mass import learn_mean
 from pretouch.contact.window import add_sample
 from pretouch.control.approach import ConstraintRows, approach_rows
-from pretouch.control.braking import TouchLimits, braking_rows, inertia_factor
+from pretouch.control.braking import braking_rows
 from pretouch.control.motion import move_within
 from pretouch.control.path import advance, follow, reduce_speed, speed_scale
 from pretouch.faults import is_plausible
@@ -165,14 +165,12 @@ def move(fixed: Blocks, remembered: Blocks, now: Blocks) -> None:
     elif approach == BRAKING:
         # posture as measured, speeds as commanded: a row tightens from what the arm was sent last
         chain = Chain(kin.anchor, kin.axis, mechanism.arm.moved_by, robot.qd_commanded)
-        touch, deadband = braking.touch, braking.deadband_m_s
-        untouched = request.untouched[0], braking.curve.untouched_s, np.inf
+        p, fixtures = braking.curve, request.untouched[0]
+        touch = p.touch_speed_m_s, braking.deadband_m_s, fixtures, p.untouched_s, np.inf
         if not np.isnan(request.touch_m_s[0]):
-            # a touch speed whatever the mass; the speeds of the objects do not count, nor what was seen before
-            touch, deadband = TouchLimits(np.inf, 1.0, 1.0, request.touch_m_s[0]), np.inf
-            untouched = request.untouched[0], 0.0, SEEN_NOW_S
-        L = inertia_factor(braking, kin, mechanism) if count[0] > 0 else np.empty((0, 0))
-        rows = braking_rows(braking, slots, near, chain, L, (touch, deadband), untouched)
+            # the speeds of the objects do not count, nor what was seen before
+            touch = request.touch_m_s[0], np.inf, fixtures, 0.0, SEEN_NOW_S
+        rows = braking_rows(braking, slots, near, chain, touch)
     move_within(motion, robot, (kin, ee, near), request, rows, (free, free), null_velocity, answer)
     command[:] = answer.command
     go_on(fixed, remembered, now)

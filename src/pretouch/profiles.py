@@ -17,7 +17,6 @@ from pretouch.control.approach import ApproachRestriction, BrakingCurve, Restric
 from pretouch.errors import ParameterError
 from pretouch.params import (
     ClampParams,
-    EffectiveMass,
     FailureParams,
     GiveUpParams,
     LocalisationParams,
@@ -100,7 +99,6 @@ PROFILES: dict[str, Profile] = {
         approach=BrakingCurve(
             margin_m=0.03,
             untouched_s=6.0,
-            effective_mass=EffectiveMass(),
             closing_deadband_m_s=0.05,
             tangential=Tangential(),
         ),

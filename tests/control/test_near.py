@@ -72,7 +72,7 @@ def test_towards_a_wall_the_arm_keeps_the_braking_curve_and_comes_to_touch(panda
     near = [s for s in steps if len(s.restricted)]
     for before, step in pairwise(near):
         cap = braking_cap(
-            float(step.obstacles.body_distance[0]), A.touch_speed_max_m_s, A.deceleration_m_s2, A.latency_s, A.margin_m
+            float(step.obstacles.body_distance[0]), A.touch_speed_m_s, A.deceleration_m_s2, A.latency_s, A.margin_m
         )
         v = approach(arm, step)
         # soft rows give a little
@@ -181,7 +181,7 @@ def touch(arm: Arm, y: float, cycles: int = 300) -> float:
 @pytest.mark.parametrize("ahead", [0.07, 0.03])
 def test_what_appears_just_ahead_at_full_speed_is_touched_no_faster_than_the_rest(panda_model, paper_skin, ahead):
     arm = on_its_way(panda_model, paper_skin, PRETOUCH)
-    assert touch(arm, wall_ahead(arm, ahead)) <= A.touch_speed_max_m_s + 0.005
+    assert touch(arm, wall_ahead(arm, ahead)) <= A.touch_speed_m_s + 0.005
 
 
 def test_a_unit_that_falls_silent_near_a_thing_lets_the_arm_go_no_faster_towards_it(panda_model, paper_skin: Skin):
@@ -240,7 +240,7 @@ def test_with_things_on_all_sides_the_arm_creeps_and_the_problem_is_solved(panda
     arm = on_its_way(panda_model, paper_skin, PRETOUCH)
     steps = arm.run(100, seen=dict.fromkeys(range(7), 0.02))
     assert {s.qp.outcome for s in steps} == {QpOutcome.SOLVED}
-    assert np.linalg.norm(hand_speed(arm, steps[-1])) < 2 * A.touch_speed_max_m_s
+    assert np.linalg.norm(hand_speed(arm, steps[-1])) < 2 * A.touch_speed_m_s
 
 
 @settings(max_examples=12)
@@ -267,7 +267,7 @@ def test_in_any_posture_nothing_that_stands_is_met_faster_than_the_curve_allows(
         for m in range(3):
             J = model.jacobian(kin, int(near.link[m]), near.body_point[m])[:3]
             cap = braking_cap(
-                float(near.body_distance[m]), A.touch_speed_max_m_s, A.deceleration_m_s2, A.latency_s, A.margin_m
+                float(near.body_distance[m]), A.touch_speed_m_s, A.deceleration_m_s2, A.latency_s, A.margin_m
             )
             speed, before = near.direction[m] @ J @ command, near.direction[m] @ J @ qd
             assert speed <= max(cap, before) + TOLERANCE

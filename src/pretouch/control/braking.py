@@ -12,12 +12,11 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.cholesky import factor, forward
 from pretouch.compiled import compiled, inlined, kernel
 from pretouch.control.approach import ConstraintRows
-from pretouch.params.pretouch import REGIONS, BrakingParams, EffectiveMass, Tangential
+from pretouch.params.pretouch import BrakingParams, Tangential
 from pretouch.records import zeros
-from pretouch.robot.kinematics import Chain, Kinematics, Mechanism, mass_matrix_into, row_along, tangents_of
+from pretouch.robot.kinematics import Chain, row_along, tangents_of
 from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles
 
 _TANGENTS = 4  # two directions across the normal, both ways along each
@@ -27,19 +26,6 @@ _AT_ONCE_M = 0.02
 """Distance from the margin of an untouched object below which the limit holds at once [m]: the arm is slow there."""
 _BACK_1_S = 4.0
 """Speed back to the margin of an untouched object for each metre within it [1/s]."""
-
-
-class TouchLimits(NamedTuple):
-    """Limits of a touch."""
-
-    force_n: float
-    """Largest force in the spring model [N]."""
-    stiffness_n_m: float
-    """Stiffness of the body region [N/m]."""
-    mass_kg: float
-    """Mass of the body region [kg]."""
-    speed_max_m_s: float
-    """Largest speed, whatever the mass [m/s]."""
 
 
 class Slots(NamedTuple):
@@ -66,10 +52,6 @@ class BrakingNumbers(NamedTuple):
     """Numbers of the braking curve, from parameters and limits."""
 
     curve: BrakingParams
-    touch: TouchLimits
-    mass: EffectiveMass
-    weighs: bool
-    """True if the touch speed follows from the arm's mass."""
     deadband_m_s: float
     """Closing speed of an object below which it counts as still [m/s]; infinite: its speed does not count."""
     across: Tangential
@@ -81,13 +63,11 @@ class BrakingNumbers(NamedTuple):
 
 def braking_numbers(params: BrakingParams, speed: float, period: float) -> BrakingNumbers:
     """Return the numbers for compiled code, with the task's speed [m/s] and the control period [s]."""
-    mass, deadband = params.effective_mass or EffectiveMass(), params.closing_deadband_m_s
-    region, across = REGIONS[mass.body_region], (params.tangential or Tangential()).numbers
-    touch = TouchLimits(mass.allowed_force_n, region.stiffness_n_m, region.mass_kg, params.touch_speed_max_m_s)
+    deadband, across = params.closing_deadband_m_s, (params.tangential or Tangential()).numbers
     if params.tangential is None:
         across = across._replace(distance_m=-np.inf)  # no distance is below that
-    still, weighs = np.inf if deadband is None else deadband, params.effective_mass is not None
-    return BrakingNumbers(params.numbers, touch, mass.numbers, weighs, still, across, speed, period)
+    still = np.inf if deadband is None else deadband
+    return BrakingNumbers(params.numbers, still, across, speed, period)
 
 
 @compiled
@@ -103,25 +83,10 @@ def braking_cap(distance: float, touch: float, deceleration: float, latency: flo
     return np.sqrt(lag * lag + touch * touch + 2.0 * deceleration * left) - lag
 
 
-@kernel
-def inertia_factor(p: BrakingNumbers, kin: Kinematics, mechanism: Mechanism) -> FloatArray:
-    """Cholesky factor (n, n) of the arm's mass matrix; (0, 0) where the touch speed does not follow from the mass."""
-    n = len(kin.anchor)
-    M, L = np.empty((n, n)), np.empty((n, n))
-    if p.weighs:
-        mass_matrix_into(kin, mechanism, M)
-        for j in range(n):
-            M[j, j] += p.mass.rotor_inertia_kg_m2
-        if factor(M, L):
-            return L
-    return np.empty((0, 0))  # a mass matrix that cannot be factored leaves the largest touch speed
-
-
 @inlined
 def braking_rows(
-    p: BrakingNumbers, slots: Slots, near: Obstacles, chain: Chain, L: FloatArray, touch: tuple[TouchLimits, float],
-    untouched: tuple[int, float, float],
-) -> ConstraintRows:  # fmt: skip
+    p: BrakingNumbers, slots: Slots, near: Obstacles, chain: Chain, touch: tuple[float, float, int, float, float]
+) -> ConstraintRows:
     """Update `slots` by one period, and return rows.
 
     The first rows belong to the obstacles; then come the fading ones, then those across the normals.
@@ -131,17 +96,21 @@ def braking_rows(
         slots: rows so far.
         near: M obstacles.
         chain: joints that move the points.
-        L: `inertia_factor`.
-        touch: limits of a touch, and the closing speed of an object below which it counts as still [m/s].
-        untouched: the `Obstacles.slot` from which obstacles must not be touched at any speed, the age of a look up to
-            which others must not, and the age from which they do not count [s].
+        touch: touch speed, closing speed of an object below which it counts as still [m/s], `Obstacles.slot` from
+            which obstacles must not be touched at any speed, age of a look up to which others must not, and age from
+            which they do not count [s].
     """
-    places, s, distance, (limits, deadband) = len(slots.link), p.curve, near.body_distance, touch
+    places, s, distance, (touch_speed, deadband, fixtures, young, old) = (
+        len(slots.link),
+        p.curve,
+        near.body_distance,
+        touch,
+    )
     most, which, present, count = _MOST_ROWS * places, np.empty(places, np.int64), np.zeros(places, np.bool_), 0
     rows = ConstraintRows(np.empty((most, len(chain.qd))), np.empty(most), which, s.slack_weight)
     for m in range(len(near.unit)):
         k = near.slot[m]
-        if not (distance[m] < s.d_notice_m and near.age[m] < untouched[2]):
+        if not (distance[m] < s.d_notice_m and near.age[m] < old):
             continue  # counts as absent: its row fades below
         present[k] = True
         if slots.link[k] != near.link[m]:
@@ -151,11 +120,8 @@ def braking_rows(
             slots.normal[k, i], slots.point[k, i] = near.direction[m, i], near.body_point[m, i]
         row = rows.G[count]
         approach = row_along(chain, slots.link[k], slots.point[k], near.direction[m], row)
-        # the row is n^T J, which gives the effective mass along the normal too
-        speed = touch_speed(mass_along(L, row), limits) if len(L) > 0 else limits.speed_max_m_s
-        stops = k >= untouched[0] or near.age[m] < untouched[1]
-        if stops:
-            speed = 0.0
+        stops = k >= fixtures or near.age[m] < young
+        speed = 0.0 if stops else touch_speed
         # a receding object allows no more; an infinite deadband ignores its speed
         own = max(0.0, near.closing_speed[m] - deadband)
         cap = braking_cap(distance[m], speed, s.deceleration_m_s2, s.latency_s, s.margin_m)
@@ -233,25 +199,3 @@ def _eased(target: float, last: float, approach: float, p: BrakingNumbers) -> fl
     """Limit between the target, the rate of loosening from the last limit, and the rate of slowing the arm."""
     eased = min(target, last + p.curve.loosen_m_s2 * p.period_s)
     return max(eased, approach - p.curve.tighten_m_s2 * p.period_s)  # last, so that it takes precedence over the target
-
-
-@kernel
-def touch_speed(mass: float, limits: TouchLimits) -> float:
-    """Speed v_c = F / sqrt(mu k) [m/s], 1/mu = 1/m_H + 1/m_R, at which two masses meet over a spring with force F.
-
-    The spring model of ISO/TS 15066, annex A, for orientation. `mass` m_R [kg] is that of the arm along the normal,
-    infinite where it cannot move.
-    """
-    # all of 1/2 mu v^2 goes into the spring, F^2 / (2 k); an infinite mass leaves mu = m_H
-    inverse = 1.0 / limits.mass_kg + 1.0 / mass
-    return min(limits.speed_max_m_s, limits.force_n * np.sqrt(inverse / limits.stiffness_n_m))
-
-
-@kernel
-def mass_along(L: FloatArray, row: FloatArray) -> float:
-    """Effective mass 1 / (g M^-1 g^T) [kg] along a row g = n^T J (n,), of a mass matrix M = L L^T; infinite for g = 0.
-
-    Khatib (1995): the inertial properties perceived at a point, along a direction.
-    """
-    inverse = forward(L, row, np.empty(len(row)))  # g M^-1 g^T = |L^-1 g|^2
-    return 1.0 / inverse if inverse > 0 else np.inf

@@ -11,7 +11,6 @@ from typing import Annotated, Literal
 from pretouch.checks import Check, Checked, Fraction, Negative, NonNegative, Positive, PositiveCount
 from pretouch.errors import ParameterError
 from pretouch.params.pretouch import BrakingParams as BrakingParams
-from pretouch.params.pretouch import EffectiveMass as EffectiveMass
 from pretouch.params.pretouch import LocalisationParams as LocalisationParams
 from pretouch.params.pretouch import MisfitParams as MisfitParams
 from pretouch.params.pretouch import NullSpaceMotion as NullSpaceMotion

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
-from pretouch.errors import ParameterError
 
 
 @dataclass(frozen=True)
@@ -153,60 +152,6 @@ class LocalisationParams(Checked):
     """Least time from one inference to the next [s]."""
 
 
-BodyRegion = Literal["hand", "forearm", "upper-arm", "chest", "abdomen", "back", "face", "skull"]
-
-
-@dataclass(frozen=True)
-class Region:
-    """Figures of a body region in the spring model of a contact. For orientation: public copies disagree."""
-
-    force_n: float
-    """Allowed quasi-static force [N]."""
-    stiffness_n_m: float
-    """Effective stiffness [N/m]."""
-    mass_kg: float
-    """Effective mass [kg]."""
-    transient: float = 2.0
-    """Factor on the force for a short contact; 1 where a short contact is allowed no more than a lasting one."""
-
-
-REGIONS: dict[BodyRegion, Region] = {
-    "hand": Region(140.0, 75_000.0, 0.6),
-    "forearm": Region(160.0, 40_000.0, 2.0),
-    "upper-arm": Region(150.0, 30_000.0, 3.0),
-    "chest": Region(140.0, 25_000.0, 40.0),
-    "abdomen": Region(110.0, 10_000.0, 40.0),
-    "back": Region(210.0, 35_000.0, 40.0),
-    "face": Region(65.0, 75_000.0, 4.4, transient=1.0),
-    "skull": Region(130.0, 150_000.0, 4.4, transient=1.0),
-}
-"""After ISO/TS 15066, annex A, as quoted in public; not checked against the standard, and no claim of conformity."""
-
-
-@dataclass(frozen=True)
-class EffectiveMass(Checked):
-    """A touch speed that follows from the arm's mass along the normal and from the force that a body region bears."""
-
-    body_region: BodyRegion = "face"
-    """Body region of the touch speed: by default that of the least speed, for a unit cannot identify the object."""
-    force_fraction: Fraction = 0.25
-    """Part of the allowed force that a touch may reach in the spring model: ours. Half is a reserve for the push until
-    the detection of the contact, and half of the rest for figures on which public copies disagree."""
-    rotor_inertia_kg_m2: NonNegative = 0.1
-    """Inertia of each drive reflected to its joint, added to the arm's [kg m^2] (model data of this package)."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.force_fraction == 0:
-            raise ParameterError("EffectiveMass.force_fraction is 0, so the touch speed would be 0: give more.")
-
-    @property
-    def allowed_force_n(self) -> float:
-        """Force that a touch may reach in the spring model [N]."""
-        region = REGIONS[self.body_region]
-        return self.force_fraction * region.force_n * region.transient
-
-
 @dataclass(frozen=True)
 class Tangential(Checked):
     """Limit on the speed of a point near an object across the normal."""
@@ -233,9 +178,9 @@ class BrakingParams(Checked):
     margin_m: NonNegative = 0.01
     """Margin on each body distance [m]: the ranging offset of a unit (at most 10 mm in the simulation; the data sheet
     of the VL53L1X allows 20 to 25 mm of error in all)."""
-    touch_speed_max_m_s: Positive = 0.05
-    """Largest touch speed v_c for any body region [m/s]: ours; a light arm would otherwise touch faster than in the
-    experiments. Force against it: docs/explanation/anticipation.md."""
+    touch_speed_m_s: Positive = 0.04
+    """Touch speed v_c [m/s]: in the spring model of ISO/TS 15066, annex A, v_c = F / sqrt(mu k) with a quarter of the
+    65 N that a face bears, its 75 N/mm, and a reduced mass mu of 2 kg, the arm's near the ready posture."""
     untouched_s: NonNegative = 0.0
     """Age of a look up to which the arm does not touch what it showed while it moves by itself [s]: it stops at the
     margin, and waits. Older places may be touched at the touch speed. 0: all, for a task that wants contact."""
@@ -247,8 +192,6 @@ class BrakingParams(Checked):
     """Rate at which a row loosens, also without its object [m/s^2]: the task's acceleration."""
     slack_weight: Positive = 1000.0
     """Weight of a row's squared violation against the squared task error of eq. 2, both in (m/s)^2."""
-    effective_mass: EffectiveMass | None = None
-    """Touch speed by the arm's mass; none: it is `touch_speed_max_m_s`."""
     closing_deadband_m_s: NonNegative | None = None
     """Closing speed of the object itself that does not count [m/s]; more of it lowers the approach limit, which needs
     `perception.memory`. Range noise of 20 mm leaves 0.05 in the estimate for an object at rest. None: the object's own

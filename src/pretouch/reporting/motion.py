@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.control.approach import ApproachRestriction, notice_m
-from pretouch.params.pretouch import REGIONS
 from pretouch.recording.run_record import MODES
 from pretouch.reporting.contacts import TRANSIENT_S, ContactMeasures
 from pretouch.reporting.html import Html, Row, Text, bad, element, facts, joined, number, percent, table
@@ -272,6 +271,17 @@ def mode_section(course: RunCourse) -> Html:
     return joined([*parts, table(rows)])
 
 
+_REGIONS_N = dict(
+    zip(
+        ("hand", "forearm", "upper arm", "chest", "abdomen", "back", "face", "skull"),
+        (140.0, 160.0, 150.0, 140.0, 110.0, 210.0, 65.0, 130.0),
+        strict=True,
+    )
+)
+"""Lasting force [N] that a body region bears, after ISO/TS 15066, annex A, as quoted in public; not checked against the
+standard, and no claim of conformity."""
+
+
 def orientation_section(contacts: ContactMeasures) -> Html:
     """The largest forces beside what regions of the body are said to bear."""
     peak, lasting = contacts.peak, contacts.lasting
@@ -283,17 +293,17 @@ def orientation_section(contacts: ContactMeasures) -> Html:
             " not detected are not in it."
         )
     rows: list[Row] = []
-    for name, region in REGIONS.items():
-        # the source has no transient figure for skull and face
-        transient_n = region.transient * region.force_n if region.transient > 1.0 else None
+    for name, force_n in _REGIONS_N.items():
+        # the source has no transient figure for skull and face, and twice the other one for the rest
+        transient_n = None if name in ("face", "skull") else 2.0 * force_n
         transient = peak / transient_n if peak is not None and transient_n else None
-        quasi_static = lasting / region.force_n if lasting is not None else None
+        quasi_static = lasting / force_n if lasting is not None else None
         rows.append(
             {
-                "body region": name.replace("-", " ").capitalize(),
+                "body region": name.capitalize(),
                 "transient [N]": number(transient_n, 0),
                 "of transient": _marked(transient),
-                "quasi-static [N]": number(region.force_n, 0),
+                "quasi-static [N]": number(force_n, 0),
                 "of quasi-static": _marked(quasi_static),
             }
         )

@@ -26,7 +26,6 @@ OFF = {
     "task.mid_joint_projected": "no",
     "slow": "on",
     "approach": "none",
-    "approach.effective_mass": "none",
     "approach.closing_deadband_m_s": "none",
     "approach.tangential": "none",
     "null_space": "none",

@@ -58,7 +58,7 @@ def speed_bound(mistaken: float) -> float:
     tighten.
     """
     p = BrakingParams()
-    cap = braking_cap(mistaken, p.touch_speed_max_m_s, p.deceleration_m_s2, p.latency_s, p.margin_m)
+    cap = braking_cap(mistaken, p.touch_speed_m_s, p.deceleration_m_s2, p.latency_s, p.margin_m)
     return float(cap + (p.loosen_m_s2 + p.tighten_m_s2) / (np.e * _DRIVE_1_S))
 
 

@@ -83,7 +83,11 @@ def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row and its record."""
     where = context.placement
     person = Visitor(context.model, visits(cell["place"], seed, where))
-    scene, path, sensors = SceneSpec(hand=HandSpec()), where.path("circle", -1.0), replace(context.ranging, realistic=True)
+    scene, path, sensors = (
+        SceneSpec(hand=HandSpec()),
+        where.path("circle", -1.0),
+        replace(context.ranging, realistic=True),
+    )
     setup = context.setup(cell, seed, scene, path, hand=person, ranging=sensors)
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
     steps = record.steps
