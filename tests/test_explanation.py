@@ -23,11 +23,12 @@ UNITS, LINKS = ("hand_front", "hand_left"), ("link0", "link5", "hand")
 AHEAD = np.array([0.3, 0.0, 0.0])
 
 
-def seen(*rows: tuple[int, float, float, int]) -> Obstacles:
-    """Obstacles of (unit, distance from the end-effector, from the body [m], link)."""
+def seen(*rows: tuple[int, float, float, int], age: float = 0.0) -> Obstacles:
+    """Obstacles of (unit, distance from the end-effector, from the body [m], link), seen so long ago [s]."""
     unit, ee, body, link = (np.array(column) for column in zip(*rows, strict=True)) if rows else (np.zeros(0),) * 4
     near = no_obstacles(len(rows))
-    return near._replace(unit=unit.astype(int), ee_distance=ee, link=link.astype(int), body_distance=body)
+    unit, link, ages = unit.astype(int), link.astype(int), np.full(len(rows), age)
+    return near._replace(unit=unit, ee_distance=ee, link=link, body_distance=body, age=ages)
 
 
 def limited(slack: float = 0.0, multiplier: float = 1.0) -> QpSolution:
@@ -82,7 +83,7 @@ def test_eq_3_is_said_with_its_factor_and_the_unit_nearest_to_the_end_effector(s
     found = said(step, obstacles=seen((1, 0.5, 0.1, 1), (0, 0.136, 0.18, 2)), **slowed)
     assert found == Explanation(Doing.SLOWED, "Slowed to 17 %: hand_front sees something at 0.18 m.")
     gone = said(step, **slowed)
-    why = "an obstacle is out of view, a unit is late, or none covers the direction of motion"
+    why = "an obstacle is out of view, or a unit or an outside source is late"
     assert gone == Explanation(Doing.SLOWED, f"Slowed to 17 %: {why}.")
     outside = said(step, obstacles=seen((2, 0.4, 0.3, 2)), speed_scale=0.5)
     assert outside.sentence == "Slowed to 50 %: an outside source sees something at 0.30 m."
@@ -129,8 +130,8 @@ def test_an_arm_kept_off_its_path_says_by_what_and_how_far_and_never_that_it_fol
     assert found == Explanation(Doing.AVOIDING, "Kept 0.12 m from its path: hand_left sees something at 0.06 m.")
     still = said(step, **off, **near, ee_velocity=np.array([0.0, 0.01, 0.0]))
     assert still == Explanation(
-        Doing.BLOCKED,
-        "At rest 0.12 m from its path: hand_left sees something at 0.06 m. It continues when the way is clear.",
+        Doing.WAITING,
+        "Waiting 0.12 m from its path: hand_left sees something at 0.06 m. It continues when the way is clear.",
     )
     assert said(step, path_position=off["path_position"]) == Explanation(
         Doing.RETURNING, "Returning to its path, 0.12 m away."
@@ -141,11 +142,23 @@ def test_an_arm_kept_off_its_path_says_by_what_and_how_far_and_never_that_it_fol
     )
 
 
-def test_an_arm_at_rest_before_something_says_what(step: ControlStep) -> None:
-    found = said(step, obstacles=seen((0, 0.02, -0.01, 2)), speed_scale=0.02, ee_velocity=np.array([0.004, 0.0, 0.0]))
-    assert found == Explanation(
-        Doing.BLOCKED, "At rest: hand_front sees something at 0.00 m. It continues when the way is clear."
-    )
+@pytest.mark.parametrize(
+    ("unit", "age", "words"),
+    [
+        (0, 0.3, "hand_front sees something at 0.04 m"),
+        (1, 2.04, "the arm remembers something at 0.04 m, seen 2 s ago by hand_left"),
+        (2, 0.44, "the arm remembers something at 0.04 m, seen 0.44 s ago by an outside source"),
+        (0, 11.7, "the arm remembers something at 0.04 m, seen 12 s ago by hand_front"),
+    ],
+)
+def test_an_arm_that_stands_before_something_says_that_it_waits_and_whether_it_sees_or_remembers_it(
+    step: ControlStep, unit: int, age: float, words: str
+) -> None:
+    near = {"obstacles": seen((unit, 0.1, 0.04, 2), age=age), "restricted": np.array([0]), "qp": limited(slack=0.01)}
+    found = said(step, **near, approach_limit=np.zeros(1), ee_velocity=np.zeros(3))
+    assert found == Explanation(Doing.WAITING, f"Waiting: {words}. It continues when the way is clear.")
+    paper = said(step, obstacles=seen((0, 0.02, -0.01, 2)), speed_scale=0.02, ee_velocity=0.01 * AHEAD)
+    assert paper.sentence == "Waiting: hand_front sees something at 0.00 m. It continues when the way is clear."
 
 
 def touched(step: ControlStep, **changes: object) -> Explanation:

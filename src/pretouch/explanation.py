@@ -13,6 +13,8 @@ from pretouch.values import BoolArray, FloatArray, value
 if TYPE_CHECKING:
     from pretouch.types import ControlStep
 
+SEEN_NOW_S = 0.3
+"""Age of a look up to which its obstacle counts as seen now [s]: as long as a unit may be silent."""
 FULL = 0.95
 """Share of the desired speed from which the arm is not called slowed: less is the noise of the joint velocities."""
 ASKED_M_S = 0.005
@@ -59,7 +61,7 @@ class Limited:
     obstacle: int = -1
     """Index in `ControlStep.obstacles` of the limiting one; -1: none, or it is out of view."""
     unit: int = -1
-    """Index in the skin of the unit that sees the obstacle; indices after those are outside points; -1: none."""
+    """Index in the skin of the unit that saw the obstacle last; indices after those are outside points; -1: none."""
     link: int = -1
     """Index of the link closest to the obstacle, or of the touched link; -1: unknown."""
     joint: int = -1
@@ -107,7 +109,6 @@ class Doing(Enum):
     SLOWED = "slowed"
     AVOIDING = "keeping away"
     RETURNING = "returning"
-    BLOCKED = "blocked"
     YIELDING = "yielding"
     TOUCHED = "touched"
     CAUGHT = "caught"
@@ -188,12 +189,15 @@ def answers(step: "ControlStep") -> bool:
 
 
 def _sees(step: "ControlStep", units: Sequence[str], obstacle: int) -> str:
-    """Say which unit sees an obstacle, or that it is a moving fixture, and how far it is from the arm."""
-    distance = max(0.0, float(step.obstacles.body_distance[obstacle]))
-    if np.isinf(step.obstacles.ee_distance[obstacle]):
+    """Say which unit sees an obstacle, or saw what is remembered, or that it is a moving fixture, and how far it is."""
+    near = step.obstacles
+    distance, age, unit = max(0.0, float(near.body_distance[obstacle])), near.age[obstacle], int(near.unit[obstacle])
+    if np.isinf(near.ee_distance[obstacle]):
         return f"a fixture that moves is {distance:.2f} m away"
-    unit = int(step.obstacles.unit[obstacle])
-    return f"{units[unit] if unit < len(units) else 'an outside source'} sees something at {distance:.2f} m"
+    source = units[unit] if unit < len(units) else "an outside source"
+    if age > SEEN_NOW_S:
+        return f"the arm remembers something at {distance:.2f} m, seen {age:.2g} s ago by {source}"
+    return f"{source} sees something at {distance:.2f} m"
 
 
 def _on_the_way(step: "ControlStep", units: Sequence[str], links: Sequence[str]) -> Explanation:
@@ -211,15 +215,13 @@ def _on_the_way(step: "ControlStep", units: Sequence[str], links: Sequence[str])
         moves = np.linalg.norm(step.desired_velocity) >= ASKED_M_S
         return Explanation(Doing.MOVING, (f"Moving at {speed:.2f} m/s: " if moves else "In position: ") + f"{nearest}.")
     cause, share = limited.obstacle, limited.share if restricted else step.speed_scale
-    no_cause = "an obstacle is out of view, a unit is late, or none covers the direction of motion"
+    no_cause = "an obstacle is out of view, or a unit or an outside source is late"
     why = _sees(step, units, cause) if cause >= 0 else no_cause
-    if restricted and off >= OFF_PATH_M:
-        place = f"{off:.2f} m from its path: {why}."
-        if speed < _REST_M_S:
-            return Explanation(Doing.BLOCKED, f"At rest {place} It continues when the way is clear.")
-        return Explanation(Doing.AVOIDING, f"Kept {place}")
-    if speed < _REST_M_S and share < 0.1:
-        return Explanation(Doing.BLOCKED, f"At rest: {why}. It continues when the way is clear.")
+    aside = f" {off:.2f} m from its path" if restricted and off >= OFF_PATH_M else ""
+    if speed < _REST_M_S and (aside or share < 0.1):
+        return Explanation(Doing.WAITING, f"Waiting{aside}: {why}. It continues when the way is clear.")
+    if aside:
+        return Explanation(Doing.AVOIDING, f"Kept{aside}: {why}.")
     back = "" if off < OFF_PATH_M else f" on its way back to the path, {off:.2f} m away"
     if share < FULL:
         return Explanation(Doing.SLOWED, f"Slowed to {100 * share:.0f} %{back}: {why}.")

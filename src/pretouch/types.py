@@ -10,6 +10,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled
+from pretouch.explanation import SEEN_NOW_S as SEEN_NOW_S
 from pretouch.explanation import Limited, limited_by
 from pretouch.inputs import SOMEWHERE as SOMEWHERE
 from pretouch.inputs import Inputs as Inputs
@@ -31,9 +32,6 @@ from pretouch.values import FloatArray as FloatArray
 from pretouch.values import IntArray as IntArray
 from pretouch.values import Number as Number
 from pretouch.values import value
-
-SEEN_NOW_S = 0.3
-"""Age of a look up to which its obstacle counts while a contact moves the arm [s]: as long as a unit may be silent."""
 
 
 class Obstacles(NamedTuple):

@@ -73,6 +73,15 @@ def test_contacts_are_counted_and_a_line_comes_every_five_seconds(watched):
     assert any("1 contact." in sentence for sentence in reporter.summary.sentences(0.01))
 
 
+def test_an_arm_that_waits_for_something_says_so_before_the_five_seconds_have_passed(watched, panda_model):
+    reporter, told, _, _ = watched
+    for i in range(300):
+        there = {"near": [(0, "panda_hand", 0.04, 0.1)], "speed_scale": 0.0} if i >= 150 else {}
+        reporter.record(SimpleNamespace(step=made.step(panda_model, stamp=0.01 * i, **there)))
+    waiting = "Waiting: hand_left sees something at 0.04 m. It continues when the way is clear."
+    assert told == ["TRACK In position: nothing near is seen.", f"TRACK {waiting}"]
+
+
 @pytest.mark.parametrize("without", ["units", "perception"])
 def test_where_nothing_can_see_it_is_not_said_that_nothing_is_seen(panda_model, paper_skin, without):
     skin = Skin([], panda_model) if without == "units" else paper_skin

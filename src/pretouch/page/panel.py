@@ -43,7 +43,6 @@ _COLOURS = {
     Doing.SLOWED: palette.FORCE,
     Doing.AVOIDING: palette.LIMITING,
     Doing.RETURNING: palette.RECOVERING,
-    Doing.BLOCKED: palette.LIMITING,
     Doing.YIELDING: palette.REACTING,
     Doing.TOUCHED: palette.REACTING,
     Doing.CAUGHT: palette.LIMITING,

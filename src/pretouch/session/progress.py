@@ -57,7 +57,7 @@ class ProgressReporter:
         self._names = of.skin.ids if of.profile.perception else (), of.model.links
         self._answered = True
         self._nearest: ControlStep | None = None
-        self._kind: tuple[Mode, Event | Doing | None, bool] | None = None
+        self._kind: tuple[Mode, Event | Doing | bool, bool] | None = None
         self._line_due = self._line_time = self._near_due = -np.inf
         self._examples: dict[Event, str] = {}
         self.summary = RunSummary()
@@ -74,7 +74,8 @@ class ProgressReporter:
             reason = self._examples.setdefault(step.event, step.reason)
             summary.holds[reason] = summary.holds.get(reason, 0.0) + self._period
         account = explain(step, *self._names)
-        part = {Mode.HOLD: step.event, Mode.REACT: account.doing, Mode.TRACK: None}[step.mode]
+        waits = account.doing is Doing.WAITING
+        part = {Mode.HOLD: step.event, Mode.REACT: account.doing, Mode.TRACK: waits}[step.mode]
         kind = (step.mode, part, resumable(step))
         if kind == self._kind:
             if step.stamp >= self._line_due:
