@@ -160,7 +160,7 @@ def test_what_units_expect_adds_up_within_one(share, expected):
 def test_levels_are_even_steps_and_colours_go_from_the_arms_own_to_red():
     assert in_levels(np.array([0.0, 0.5, 1.0])) == (0, LEVELS // 2, LEVELS)
     assert len({in_levels(np.array([e])) for e in np.linspace(0, 1, 1000)}) == LEVELS + 1
-    plain, half, full = palette.expected(np.array([0.0, 0.5, 1.0]))
+    plain, half, full = palette.between(palette.EXPECTED, np.array([0.0, 0.5, 1.0]))
     np.testing.assert_allclose(plain, palette.ARM)
     assert full[0] > 190
     assert full[1:].max() < 50

@@ -11,6 +11,7 @@ from pretouch.page.frame import Frame
 from pretouch.page.scene import ARROW_MOST_M, PARTS, Scene
 from pretouch.page.simulation import LiveSimulation
 from pretouch.page.trail import BLOCK, BLOCKS, SPACING_M, Activity, Trail, activity
+from pretouch.perception.local_map import map_init
 from pretouch.profiles import PROFILES
 from pretouch.types import NOT_TOUCHED, ControlStep, Mode, Touched, no_obstacles
 
@@ -54,10 +55,9 @@ def sensing(step: ControlStep, multiplier: float = 0.0) -> ControlStep:
     return replace(step, obstacles=obstacles, range_distance=distance, restricted=np.array([0]), qp=qp)
 
 
-def test_a_sensed_point_is_a_sphere_where_it_is_and_the_cone_reaches_as_far(drawn, some_step):
+def test_a_sensed_point_is_drawn_where_it_is_and_the_cone_reaches_as_far(drawn, some_step):
     nodes = drawn(sensing(some_step))
-    np.testing.assert_allclose(nodes["/points"].batched_positions[2], POINT, atol=1e-6)
-    assert (nodes["/points"].batched_scales > 1e-3).tolist() == [False, False, True, False, False, False, False]
+    np.testing.assert_allclose(nodes["/points"].points, [POINT], atol=1e-3)
     assert nodes[CONES].batched_scales[2] == pytest.approx(0.2)
     assert nodes[CONES].batched_opacities[2] > nodes[CONES].batched_opacities[0]
 
@@ -78,21 +78,37 @@ def test_a_reading_that_no_obstacle_is_made_of_is_a_point_only_where_perception_
     step = replace(some_step, range_distance=distance, obstacles=no_obstacles())
     nodes = drawn(step)
     points, cones = nodes["/points"], nodes[CONES]
-    assert np.all(points.batched_scales < 1e-3)  # the arm itself, which the filter left out
+    assert len(points.points) == 0  # the arm itself, which the filter left out
     idle = cones.batched_scales[0]
     assert cones.batched_scales[2] == idle > 0.04
 
     scene.show_world(replace(world, profile=PROFILES["blind"]))
     drawn(step, 0.1)
-    assert np.flatnonzero(points.batched_scales > 1e-3).tolist() == [2]
     kin, pose = world.model.kinematics(step.q), world.skin.T_link_sensor[2]
     link = world.skin.link[2]
     expected = kin.position[link] + kin.rotation[link] @ (pose[:3, :3] @ (0.0, 0.0, 0.03) + pose[:3, 3])
-    np.testing.assert_allclose(points.batched_positions[2], expected, atol=1e-6)
+    np.testing.assert_allclose(points.points, [expected], atol=1e-3)
     assert cones.batched_scales[2] == pytest.approx(0.03)
 
     drawn(step, 0.2, age=np.full(7, 1.0))
-    assert np.all(points.batched_scales < 1e-3)
+    assert len(points.points) == 0
+
+
+def test_remembered_places_fade_and_the_units_glow_that_see_them_now(drawn, some_step):
+    places = map_init(4)
+    places.number[0], places.place[0], places.place[1] = 3, POINT, -POINT
+    places.unit[:3], places.seen[:3] = (2, 0, -1), some_step.stamp - np.array([0.0, 3.0, 12.0])
+    nodes = drawn(replace(some_step, range_distance=np.full(7, 0.3)), places=places)
+    np.testing.assert_allclose(nodes["/points"].points, [POINT, -POINT, np.zeros(3)], atol=1e-3)
+    now, before, long_ago = nodes["/points"].colors.astype(float)
+    np.testing.assert_array_equal([now, long_ago], palette.REMEMBERED)
+    np.testing.assert_allclose(before, 0.75 * now + 0.25 * long_ago, atol=0.5)
+    drawn(some_step, 0.1, places=places._replace(seen=np.full(4, some_step.stamp), unit=np.full(4, -1)))
+    assert not np.any(nodes[UNITS].batched_colors == palette.as_vertex(palette.SEEING))
+    nodes = drawn(replace(some_step, range_distance=np.full(7, 0.3)), 0.2, places=places)
+    assert np.flatnonzero(nodes[CONES].batched_scales > 0.2).tolist() == [2]
+    glows = np.all(nodes[UNITS].batched_colors == palette.as_vertex(palette.SEEING), axis=1)
+    assert np.flatnonzero(glows).tolist() == [2]
 
 
 @pytest.mark.parametrize(

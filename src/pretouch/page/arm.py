@@ -111,7 +111,7 @@ class PaintedLink:
 
     def _painted(self) -> bytes:
         levels = np.array(self._levels, dtype=np.float64) / LEVELS
-        return coloured(self._mesh, palette.expected(on_surface(self._share, levels)))
+        return coloured(self._mesh, palette.between(palette.EXPECTED, on_surface(self._share, levels)))
 
     def paint(self, levels: tuple[int, ...], now: float) -> None:
         """Colour by what the units expect, in `LEVELS`, at a time [s]."""

@@ -7,6 +7,7 @@ import numpy as np
 from pretouch.control.commander import reference_of
 from pretouch.control.path import Path
 from pretouch.desired import Desired, DesiredKind
+from pretouch.perception.local_map import LocalMap
 from pretouch.profiles import Profile
 from pretouch.recording.simulation import KnownBox
 from pretouch.robot.kinematics import Kinematics
@@ -53,6 +54,8 @@ class Frame:
     """(K,) time since the newest reading of each unit [s]; None where it is not known."""
     inputs: Inputs | None = None
     """Inputs of the step, with the motion that a commander requested; None where they are unknown."""
+    places: LocalMap | None = None
+    """Remembered places after the step; None where the controller remembers none, or they are unknown."""
 
     def late(self, limit: float) -> BoolArray:
         """Mask of the units (K,) without a reading for longer than a time [s]."""

@@ -39,6 +39,8 @@ OLIVE: Colour = (170, 150, 40)
 
 EXPECTED: tuple[Colour, ...] = (ARM, (250, 208, 138), (242, 130, 58), (204, 28, 36))
 """The arm where contact is not expected, less, more, and most."""
+REMEMBERED: tuple[Colour, ...] = (SENSED, (203, 228, 213))
+"""A place that is seen now, and one that nothing has seen for long."""
 UNITS = (PATH, FORCE, SENSED, LIMITING, REACTING, BROWN, PINK, TEAL, OLIVE, FOLLOWING)
 """A colour for each unit, over again from the eleventh on."""
 
@@ -56,11 +58,11 @@ _LINES = {
 }
 
 
-def expected(expectation: FloatArray) -> FloatArray:
-    """Colours (V, 3) of a surface where contact is expected by so much (V,), from 0 to 1."""
-    at = np.clip(expectation, 0.0, 1.0) * (len(EXPECTED) - 1)
-    steps = np.arange(len(EXPECTED))
-    return np.stack([np.interp(at, steps, [colour[i] for colour in EXPECTED]) for i in range(3)], axis=1)
+def between(colours: tuple[Colour, ...], share: FloatArray) -> FloatArray:
+    """Colours (V, 3) that are shares (V,) of the way from the first to the last, from 0 to 1."""
+    at = np.clip(share, 0.0, 1.0) * (len(colours) - 1)
+    steps = np.arange(len(colours))
+    return np.stack([np.interp(at, steps, [colour[i] for colour in colours]) for i in range(3)], axis=1)
 
 
 def as_vertex(colours: ArrayLike) -> NDArray[np.uint8]:
@@ -78,10 +80,9 @@ def css(colour: Colour) -> str:
 def legend() -> str:
     """Legend of the colours in space, as HTML."""
     marks = "".join(_mark(name, css(colour), 14, 4, 2) for name, colour in _LINES.items())
-    marks += _mark("sensed", css(SENSED), 9, 9, 5) + _mark("closest pair", css(PAIR), 14, 2, 0)
-    marks += _mark("silent unit", css(UNIT_SILENT), 8, 8, 1)
-    ramp = ",".join(css(colour) for colour in EXPECTED)
-    marks += _mark("contact expected", f"linear-gradient(90deg,{ramp})", 46, 8, 4)
+    marks += _mark("closest pair", css(PAIR), 14, 2, 0) + _mark("silent unit", css(UNIT_SILENT), 8, 8, 1)
+    for name, colours in {"seen now, and before": REMEMBERED, "contact expected": EXPECTED}.items():
+        marks += _mark(name, f"linear-gradient(90deg,{','.join(map(css, colours))})", 46, 8, 4)
     return f"<div style='padding:4px 12px 10px;font-size:11px;display:flex;flex-wrap:wrap;gap:3px 12px'>{marks}</div>"
 
 

@@ -84,7 +84,7 @@ class Plots:
         self._gui, self._history, self._sent = gui, history, -np.inf
         self._caption("Touch", [("a contact from 1 on", _FORCE)])
         self._evidence = self._plot([_FORCE, _GREY], 84, (0.0, 1.5), dashed=1)
-        self._caption("Nearest [m]", [("from the arm to what a unit sees", _SENSED)])
+        self._caption("Nearest [m]", [("from the arm to what is seen or remembered", _SENSED)])
         self._nearest = self._plot([_SENSED], 84, (0.0, 1.0))
         self._caption("Speed [m/s]", [("of the hand", _SPEED), ("asked for", _GREY)])
         self._speed = self._plot([_SPEED, _GREY], 84, (0.0, 0.4), dashed=1)

@@ -127,7 +127,7 @@ class Scene:
         self._arm.place(kin)
         self._arm.paint(in_levels(expected), now)
         silent = frame.late(world.profile.sight.silent_after_s)
-        self.units.draw(step, kin, silent, world.profile.perception is not None)
+        self.units.draw(frame, kin, silent, world.profile.perception is not None)
         self.trail.draw(now)
         self._draw_pairs(step)
         self._draw_forces(frame, kin.position[world.model.ee])

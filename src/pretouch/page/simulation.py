@@ -19,6 +19,7 @@ from pretouch.page.frame import Frame, World
 from pretouch.page.opening import Opening
 from pretouch.page.real_units import RealUnits
 from pretouch.page.room import Faults, LiveSettings, PathName, Room, live_path
+from pretouch.perception.local_map import LocalMap
 from pretouch.profiles import Profile
 from pretouch.recording.simulation import surroundings, truth_of
 from pretouch.robot.description import panda
@@ -127,7 +128,8 @@ class LiveSimulation:
         hand = room.hand.position
         age = cycle.step.stamp - cycle.inputs.readings.stamp
         force = room.plant.true_force + self._pushes.force
-        self.frame = Frame(cycle.step, hand, room.mouse.target, force, room.touched, age, cycle.inputs)
+        places = cycle.after.memory.part("places", LocalMap) if self.controller.remembers else None
+        self.frame = Frame(cycle.step, hand, room.mouse.target, force, room.touched, age, cycle.inputs, places)
         if self._push:
             self.notice = self._push.take(cycle.step) or self.notice
         self._keep(cycle, hand)

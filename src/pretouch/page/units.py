@@ -1,4 +1,4 @@
-"""Sensor units on the page: their places, cones and sensed points."""
+"""Sensor units on the page: their places and cones, and the places that they saw occupied."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,32 +8,34 @@ import trimesh
 from numpy.typing import NDArray
 from viser import BatchedMeshHandle, SceneApi
 
-from pretouch.explanation import binding
+from pretouch.explanation import SEEN_NOW_S, binding
 from pretouch.page import palette
 from pretouch.page.arm import SHADELESS, quaternions
-from pretouch.perception.obstacles import locate, placed_sensors, points_of_units
+from pretouch.page.frame import Frame
+from pretouch.perception.obstacles import locate, placed_sensors
 from pretouch.robot.kinematics import Kinematics
 from pretouch.sensing.skin import Skin
-from pretouch.types import BoolArray, ControlStep, FloatArray, IntArray
+from pretouch.types import BoolArray, FloatArray, IntArray
 
 _IDLE_M = 0.06
 """Length at which a cone is drawn that shows nothing [m]."""
 _FAINT, _CLEAR = 0.2, 0.7
 _UNIT_M = (0.020, 0.014, 0.004)
-_POINT_M = 0.014
-_GONE = 1e-6
-"""Scale of what is not to be seen: the number of instances stays, so that the page keeps its buffers."""
+_POINT_M = 0.012
+"""Radius at which a place is drawn [m]: larger, the nearest hide the hand."""
+_FADED_S = 12.0
+"""Age from which a place has the palest colour [s]."""
 
 
 class Units:
-    """All units of a skin, each as a plate and a cone on its link, and a sphere where it senses something."""
+    """All units of a skin, each as a plate and a cone on its link, and what they have seen as points."""
 
     def __init__(self, scene: SceneApi, skin: Skin, links: Sequence[str], root: str = "") -> None:
         """Put the units under the nodes `ROOT/arm/LINK` of their links, named in order of their index."""
         self._scene, self._skin = scene, skin
         self._plates: list[tuple[IntArray, BatchedMeshHandle]] = []
         self._cones: list[tuple[IntArray, BatchedMeshHandle]] = []
-        plate, ball = trimesh.creation.box(_UNIT_M), trimesh.creation.icosphere(subdivisions=2)
+        plate = trimesh.creation.box(_UNIT_M)
         boards, poses = skin.first, np.array([unit.T_link_sensor for unit in skin.mounted])
         for link in np.unique(skin.link):
             node, here = f"{root}/arm/{links[link]}", np.flatnonzero(skin.link[boards] == link)
@@ -54,9 +56,9 @@ class Units:
                     side="double",
                 )
                 self._cones.append((alike, cones))
-        nowhere = np.tile(np.eye(4), (len(skin), 1, 1))
-        hidden = np.full(len(skin), _GONE)
-        self.points = self._add(f"{root}/points", ball, nowhere, palette.SENSED, batched_scales=hidden)
+        self.points = scene.add_point_cloud(
+            f"{root}/points", np.zeros((0, 3)), palette.SENSED, point_size=_POINT_M, point_shape="circle"
+        )
 
     def _add(
         self, name: str, shape: trimesh.Trimesh, poses: FloatArray, colour: palette.Colour, **look: Any
@@ -73,40 +75,41 @@ class Units:
         for _, cones in self._cones:
             cones.visible = visible
 
-    def draw(self, step: ControlStep, kin: Kinematics, silent: BoolArray, perceiving: bool) -> None:
+    def draw(self, frame: Frame, kin: Kinematics, silent: BoolArray, perceiving: bool) -> None:
         """Show what the units see, and which of them (K,) are silent.
 
         A controller that is not `perceiving` has no obstacles: then every reading is a sensed point.
         """
-        marks = [silent, *reversed(self._glowing(step))]
+        reading, near = np.where(silent, np.nan, frame.step.range_distance), frame.step.obstacles
+        if not perceiving:
+            unit = np.flatnonzero(np.isfinite(reading))
+            points, age = locate(*placed_sensors(self._skin.arrays, kin)[:2], reading)[unit], np.zeros(len(unit))
+        elif frame.places is None:
+            points, age, unit = near.point, near.age, near.unit
+        else:
+            places, some = frame.places, slice(frame.places.number[0])
+            points, age, unit = places.place[some], frame.step.stamp - places.seen[some], places.unit[some]
+        seeing = self._mask(unit[age <= SEEN_NOW_S]) & np.isfinite(reading)
+        marks = [silent, self._mask(near.unit[frame.step.restricted[binding(frame.step)]]), seeing]
         cones = _coloured(marks, palette.CONE)
         # of zones, what any of them says
         plates = _coloured([np.logical_or.reduceat(mark, self._skin.first) for mark in marks], palette.UNIT)
-        reading = np.where(silent, np.nan, step.range_distance)
-        if perceiving:
-            points = points_of_units(step.obstacles, len(reading))
-        else:
-            points = locate(*placed_sensors(self._skin.arrays, kin)[:2], reading)
-        sensing = np.isfinite(points[:, 0])
-        # a unit that sees the floor, or the arm itself, senses nothing
-        lengths = np.where(sensing, np.round(reading, 2), _IDLE_M).astype(np.float32)
-        opacities = np.where(sensing, _CLEAR, _FAINT).astype(np.float32)
+        # a beam is drawn up to what it shows, so far it is empty; one that shows the floor or the arm is not drawn
+        lengths = np.where(seeing, np.round(reading, 2), _IDLE_M).astype(np.float32)
+        opacities = np.where(seeing, _CLEAR, _FAINT).astype(np.float32)
         for boards, handle in self._plates:
             handle.batched_colors = plates[boards]
         for units, handle in self._cones:
             handle.batched_colors, handle.batched_scales = cones[units], lengths[units]
             handle.batched_opacities = opacities[units]
-        self.points.batched_positions = np.nan_to_num(points).astype(np.float32)
-        self.points.batched_scales = np.where(sensing, _POINT_M, _GONE).astype(np.float32)
+        self.points.points = points.astype(np.float16)
+        self.points.colors = np.rint(palette.between(palette.REMEMBERED, age / _FADED_S)).astype(np.uint8)
 
-    def _glowing(self, step: ControlStep) -> tuple[BoolArray, BoolArray]:
-        """Masks of the units (K,) that see an obstacle, and of those whose obstacles restrict the arm."""
-        unit, count = step.obstacles.unit, len(self._skin)  # what other sources see is at no unit
-        seeing, limiting = np.zeros((2, count), np.bool_)
-        seeing[unit[unit < count]] = True
-        limits = unit[step.restricted[binding(step)]]
-        limiting[limits[limits < count]] = True
-        return seeing, limiting
+    def _mask(self, units: IntArray) -> BoolArray:
+        """Mask (K,) of those units among some; what other sources see is at no unit."""
+        mask = np.zeros(len(self._skin), np.bool_)
+        mask[units[(units >= 0) & (units < len(mask))]] = True
+        return mask
 
 
 def _coloured(marks: Sequence[BoolArray], plain: palette.Colour) -> NDArray[np.uint8]:
