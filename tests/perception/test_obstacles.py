@@ -9,12 +9,11 @@ from pretouch.perception.obstacles import (
     locate,
     measured,
     newer,
-    points_of_units,
     track_init,
     update_tracks,
 )
 from pretouch.sensing.sensor import PAPER_SENSOR, cones_of
-from pretouch.types import RangeStatus, no_obstacles
+from pretouch.types import RangeStatus
 
 INF, NAN = np.inf, np.nan
 SHOWN = [RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED]
@@ -150,10 +149,3 @@ def test_a_track_holds_what_was_really_shown(messages):
             assert any(shown and 0.02 * a == state.point_stamp[0] for a, (shown, _) in messages[: tick + 1])
         if state.report_stamp[0] > -INF:
             assert any(told and 0.02 * a == state.report_stamp[0] for a, (_, told) in messages[: tick + 1])
-
-
-def test_points_of_units_leave_out_those_of_other_sources():
-    seen = no_obstacles(4)._replace(unit=np.array([2, 0, 3, 9]), point=np.arange(12.0).reshape(4, 3))
-    found = points_of_units(seen, 3)
-    assert found[[2, 0]].tolist() == [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]
-    assert np.isnan(found[1]).all()

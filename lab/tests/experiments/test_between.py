@@ -72,13 +72,12 @@ def test_the_table_counts_what_the_rows_say(trials):
     assert table.rows[1][1:5] == ("2/2", "2/2", "1/2", f"{1000 * rows[1]['detection_delay_s']:.0f}")
 
 
-def test_a_trace_has_what_each_unit_showed_and_the_close_up_the_touch_and_both_bounds(trials, paper_skin):
+def test_a_trace_has_the_nearest_obstacle_and_the_close_up_the_touch_and_both_bounds(trials, paper_skin):
     row, record = trials["paper"]
     trace = trace_of(record)
-    for step, points in zip(record.steps[::20], trace.sensed_point[::20], strict=True):
-        shown = np.full((7, 3), np.nan)
-        shown[step.obstacles.unit] = step.obstacles.point
-        np.testing.assert_array_equal(points, shown)
+    for step, point in zip(record.steps[::20], trace.nearest_point[::20], strict=True):
+        near = step.obstacles.point[np.argsort(step.obstacles.ee_distance)]
+        np.testing.assert_array_equal(point, near[0] if len(near) else np.full(3, np.nan))
     top, bottom = close_up([({"profile": "paper"}, trace)], paper_skin.ids).axes
     low, high = bottom.get_xlim()
     touch = next(s.stamp for s in record.reactions()) - row["detection_delay_s"]

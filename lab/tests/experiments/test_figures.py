@@ -19,9 +19,8 @@ TOUCHED, DETECTED = slice(300, 320), 305
 def made_trace() -> RunRecord:
     """Four seconds at rest at y = 0.2: an object at y = 0.6 from 1 s to 2 s, and a push of 20 N along +y at 3 s."""
     zeros = np.zeros((S, 3))
-    points = np.full((S, 7, 3), np.nan)
-    points[100:200, 1] = [0.5, 0.6, 0.3]
-    ranges = np.where(np.isfinite(points[:, :, 0]), 0.3, np.nan)
+    points, ranges = np.full((S, 3), np.nan), np.full((S, 7), np.nan)
+    points[100:200], ranges[100:200, 1] = [0.5, 0.6, 0.3], 0.3
     scale, true, reacting = np.ones(S), zeros.copy(), np.zeros(S, bool)
     scale[100:200], scale[200:250] = 0.5, 0.8
     true[TOUCHED, 1] = 20.0
@@ -32,7 +31,7 @@ def made_trace() -> RunRecord:
     return RunRecord(
         time=0.01 * np.arange(S), mode=np.where(reacting, MODES.index(Mode.REACT), MODES.index(Mode.TRACK)),
         ee_position=place, ee_velocity=zeros, path_position=place, speed_scale=scale, range_distance=ranges,
-        sensed_point=points, force=true, filtered_force=0.5 * true, thresholds=thresholds, armed=np.ones(S, bool),
+        nearest_point=points, force=true, filtered_force=0.5 * true, thresholds=thresholds, armed=np.ones(S, bool),
         evidence=np.zeros(S), contacts=((DETECTED, found, 0.1),), truth=TrueForces(0.01 * np.arange(S), true),
     )  # fmt: skip
 

@@ -63,13 +63,6 @@ def track_init(units: int) -> TrackState:
     return TrackState(nowhere[0].copy(), never, never.copy(), never.copy(), nowhere)
 
 
-def points_of_units(obstacles: Obstacles, units: int) -> FloatArray:
-    """Return the obstacle point of each unit of a skin (K, 3) [m], NaN without one; other sources are left out."""
-    points, own = np.full((units, 3), np.nan), obstacles.unit < units
-    points[obstacles.unit[own]] = obstacles.point[own]
-    return points
-
-
 @compiled
 def placed_sensors(skin: SkinArrays, kin: Kinematics) -> Sensors:
     """Return the poses of a skin's sensors in a posture: T_O_link @ T_link_sensor."""

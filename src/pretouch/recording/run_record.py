@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pretouch.perception.obstacles import points_of_units
-from pretouch.types import BoolArray, Contact, ControlStep, FloatArray, IntArray, Mode
+from pretouch.types import BoolArray, Contact, ControlStep, FloatArray, IntArray, Mode, Obstacles
 
 MODES = tuple(Mode)
 """Modes by the numbers in `RunRecord.mode`."""
@@ -73,8 +72,8 @@ class RunRecord(DetectorRecord):
     """(S,) factor on the speed along the path, eqs. 3 and 4."""
     range_distance: FloatArray
     """(S, K) readings used [m]."""
-    sensed_point: FloatArray
-    """(S, K, 3) obstacle that each unit showed (eq. 1) [m]."""
+    nearest_point: FloatArray
+    """(S, 3) obstacle nearest to the end-effector's origin [m]; fixtures that move are left out."""
     filtered_force: FloatArray
     """(S, 3) value of eq. 8 [N]."""
     evidence: FloatArray
@@ -126,8 +125,13 @@ def columns_of(steps: Sequence[ControlStep], *more: str) -> Columns:
         "time": np.array([step.stamp for step in steps]),
         "mode": np.array([MODES.index(step.mode) for step in steps]),
         "thresholds": np.array([step.thresholds for step in steps]),
-        "sensed_point": np.array([points_of_units(step.obstacles, len(step.range_distance)) for step in steps]),
+        "nearest_point": np.array([_nearest(step.obstacles) for step in steps]),
     }
+
+
+def _nearest(obstacles: Obstacles) -> FloatArray:
+    finite = np.flatnonzero(np.isfinite(obstacles.ee_distance))
+    return obstacles.point[finite[obstacles.ee_distance[finite].argmin()]] if len(finite) else np.full(3, np.nan)
 
 
 def contacts_of(steps: Sequence[ControlStep], first: int = 0) -> list[tuple[int, Contact, float]]:

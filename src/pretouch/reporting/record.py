@@ -47,9 +47,7 @@ class RunCourse(RunRecord):
     link_distance: FloatArray
     """(S, L) least distance of anything sensed from the surface of each link, where that link was the closest [m]."""
     ee_distance: FloatArray
-    """(S,) distance of the nearest sensed point from the end-effector's origin [m]."""
-    nearest_point: FloatArray
-    """(S, 3) that point [m]."""
+    """(S,) distance of `nearest_point` from the end-effector's origin, less its spread [m]."""
     answering: BoolArray
     """(S,) whether the arm moves with a contact."""
     detectable_n: FloatArray
@@ -154,24 +152,19 @@ def _block(batch: list[Kept], links: int, units: int) -> Columns:
 
 
 def _near(batch: list[Kept], links: int, units: int) -> Columns:
-    """Least sensed distance of each step by unit and by link, and the nearest point."""
+    """Least sensed distance of each step by unit, by link and from the end-effector."""
     obstacles = [cycle.step.obstacles for cycle in batch]
     row = np.repeat(np.arange(len(obstacles)), [len(o.unit) for o in obstacles])
     unit = np.concatenate([o.unit for o in obstacles])
     link = np.concatenate([o.link for o in obstacles])
     body = np.concatenate([o.body_distance for o in obstacles])
     ee = np.concatenate([o.ee_distance for o in obstacles])
-    point = np.concatenate([o.point for o in obstacles]).reshape(-1, 3)
-    by_unit = np.full((len(obstacles), units), np.nan)
-    by_link = np.full((len(obstacles), links), np.nan)
+    by_unit, by_link, nearest = (np.full((len(obstacles), *shape), np.nan) for shape in ((units,), (links,), ()))
     own = unit < units  # what outside sources see is of no unit
     np.fmin.at(by_unit, (row[own], unit[own]), body[own])
     np.fmin.at(by_link, (row, link), body)
-    nearest, where = np.full(len(obstacles), np.nan), np.full((len(obstacles), 3), np.nan)
-    farthest_first = np.argsort(-ee, kind="stable")  # of several entries for a row the last one stays
-    farthest_first = farthest_first[np.isfinite(ee[farthest_first])]
-    nearest[row[farthest_first]], where[row[farthest_first]] = ee[farthest_first], point[farthest_first]
-    return {"body_distance": by_unit, "link_distance": by_link, "ee_distance": nearest, "nearest_point": where}
+    np.fmin.at(nearest, row, np.where(np.isinf(ee), np.nan, ee))  # of fixtures that move it is infinite
+    return {"body_distance": by_unit, "link_distance": by_link, "ee_distance": nearest}
 
 
 def _inputs(batch: list[Kept], units: int) -> Columns:

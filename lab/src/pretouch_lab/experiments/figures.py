@@ -39,9 +39,8 @@ def shade(axes: Axes, time: FloatArray, flags: BoolArray, colour: str, hatch: st
 
 
 def near(trace: RunRecord, d_max: float) -> BoolArray:
-    """Return flags (S,) of the steps with a sensed point within d_max [m] of the end-effector's origin."""
-    distance = np.linalg.norm(trace.sensed_point - trace.ee_position[:, None], axis=2)
-    return np.any(distance < d_max, axis=1)
+    """Return flags (S,) of the steps with an obstacle within d_max [m] of the end-effector's origin."""
+    return np.asarray(np.linalg.norm(trace.nearest_point - trace.ee_position, axis=1) < d_max)
 
 
 def slowed(trace: RunRecord) -> BoolArray:
@@ -118,14 +117,13 @@ def _first(traces: list[Trace]) -> tuple[RunRecord, Profile]:
 
 
 def _plane(axes: Axes, trace: RunRecord, avoiding: BoolArray, recovering: BoolArray, profile: Profile) -> None:
-    """Draw path, end-effector and sensed points in the plane of the circle."""
+    """Draw path, end-effector and the obstacles nearest to it in the plane of the circle."""
     ee = trace.ee_position
     axes.plot(*trace.path_position[:, 1:].T, color="tab:blue", lw=7, alpha=0.3, label="path")
     axes.plot(*_where(ee, ~avoiding & ~recovering), color="black", lw=0.8, label="free")
     axes.plot(*_where(ee, avoiding), color="tab:red", lw=2.2, zorder=4, label="avoidance")
     axes.plot(*_where(ee, recovering), color="tab:green", lw=2.2, ls=(0, (2, 1)), zorder=3, label="recovery")
-    within = np.linalg.norm(trace.sensed_point - ee[:, None], axis=2) < profile.d_max_m
-    points = trace.sensed_point[within & avoiding[:, None]][::_POINTS]
+    points = trace.nearest_point[near(trace, profile.d_max_m) & avoiding][::_POINTS]
     axes.plot(*points[:, 1:].T, "o", color="limegreen", mec="black", mew=0.4, ms=4, ls="", label="sensed objects")
     axes.set_aspect("equal")
     axes.set(
