@@ -98,6 +98,17 @@ def test_alarms_of_a_whole_stream_are_those_of_its_steps_one_by_one(name):
     assert alarms
 
 
+def test_only_a_detector_with_a_memory_is_given_what_was_seen_before():
+    _, stream = touched("paper")
+    count, ages = np.zeros_like(stream.count), np.array([0.0, 0.06, 0.07, 5.0])
+    count[[3, 7]] = 1, 3
+    stream = replace(stream, count=count, obstacles=no_obstacles(4)._replace(age=ages))
+    for name, left in (("blind", [0, 0]), ("paper", [1, 1]), ("pretouch", [1, 3])):
+        near, number = stream.near(profile(name).perception)
+        assert number[[3, 7]].tolist() == left
+        np.testing.assert_array_equal(near.age, ages[: number.sum()])
+
+
 @pytest.mark.parametrize("name", ["paper", "pretouch"])
 def test_the_first_motion_of_an_answer_is_with_the_push(name):
     _, stream = touched(name)

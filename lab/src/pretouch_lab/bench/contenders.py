@@ -18,14 +18,12 @@ WITHOUT = "without "
 
 OFF = {
     "perception.self_aside_m": "0",
-    "perception.closing": "none",
-    "perception.reckon_below_minimum": "no",
-    "perception.place_at_stamp": "no",
-    "perception.keep_while_silent": "no",
+    "perception.memory": "none:perception.outside=none",
     "perception.outside": "none",
     "task.mid_joint_projected": "no",
     "slow": "on",
     "approach": "none",
+    "approach.untouched_s": "0",
     "approach.closing_deadband_m_s": "none",
     "approach.tangential": "none",
     "null_space": "none",

@@ -22,7 +22,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles, RobotState, some_of
 from pretouch_lab.baselines.fixed_bounds import FixedBounds
 from pretouch_lab.bench.contenders import Contender
-from pretouch_lab.bench.streams import NOTHING, Stream
+from pretouch_lab.bench.streams import Stream
 from pretouch_lab.replay import DetectorAlone, FirstMotion
 
 REST = DecayingVelocity().decay_cycles
@@ -82,12 +82,14 @@ class Steps:
                 push = reaction_velocity(replayed.force[at], react.compliance_m_s_n, react.speed_max_m_s)
                 replayed.motion[at] = least @ push
             return replayed
-        sees, steps = params.perception is not None, len(self.stream.count)
+        sees, steps, end = params.perception is not None, len(self.stream.count), 0
+        every, count = self.stream.near(params.perception)
         detector, first = DetectorAlone(params, model), FirstMotion(model, params, self.stream.robot["q"][0], REST)
         alarm, statistic, force = np.zeros(steps, np.bool_), np.empty(steps), np.full((steps, 3), np.nan)
         motion = np.full((steps, model.n), np.nan)
-        for i, (robot, obstacles, reacting, watched, kin) in enumerate(self.each):
-            near = obstacles if sees else NOTHING
+        for i, (robot, _, reacting, watched, kin) in enumerate(self.each):
+            end += count[i]
+            near = some_of(every, end - count[i], end)
             detection = detector.step(kin, robot, near, reacting, sees and watched)
             statistic[i] = contender.statistic(detection, detector.window.newest, robot.wrench)
             if detection.contact is not None:
@@ -105,7 +107,7 @@ def alarms_of(steps: Steps, contender: Contender) -> Replayed:
     count, valid = len(stream.count), np.isfinite(robot["wrench"][:, 0])
     armed = np.cumsum(valid) - valid >= params.window.samples
     statistic, force = np.full(count, -np.inf), np.full((count, 3), np.nan)
-    near = Obstacles(**stream.obstacles), stream.count if sees else np.zeros_like(stream.count)
+    near = stream.near(params.perception)
     if isinstance(detect, MovingThresholds):
         alarm, window = np.zeros(count, np.bool_), window_init(params.window.samples)
         thresholds = detect.numbers, params.window.numbers, detect.compare == "filtered"

@@ -14,24 +14,23 @@ from pretouch.controller import Controller
 from pretouch.line import SEE
 from pretouch.loop import Cycle, instant
 from pretouch.modes import CLEAR
-from pretouch.params import TaskParams
+from pretouch.params import PerceptionParams, TaskParams
 from pretouch.profiles import profile
 from pretouch.sensing.skin import Skin
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import GhostSpec, SceneSpec
-from pretouch.types import ControlStep, FloatArray, IntArray, Mode, Obstacles, RobotState, no_obstacles
+from pretouch.types import ControlStep, FloatArray, IntArray, Mode, Obstacles, RobotState, no_obstacles, some_of
 from pretouch_lab.bench.scenes import Sensing, model
 from pretouch_lab.replay import Ghost, Place
 from pretouch_lab.trial import Setup, SimulatedTrial
 
-PROFILE = "paper:detect.f_base_n=1000:slow=none:approach=none:perception.closing=on:perception.self_aside_m=0.005"
+PROFILE = "paper:detect.f_base_n=1000:slow=none:approach=none:perception.memory=on:perception.self_aside_m=0.005"
 """Profile of the recorded arms: they sense proximity, but no force is a contact and no obstacle changes the motion.
-Closing speeds are estimated for detectors that use them. Readings of the arm itself are left out as in `pretouch`."""
+Places are remembered for detectors that use them. Readings of the arm itself are left out as in `pretouch`."""
 
 _ROBOT = tuple(f.name for f in fields(RobotState))
-_OBSTACLES = Obstacles._fields
 AWAY = np.array([0.0, 0.0, 4.0])
 """Parking place of the ghost (3,) [m], beyond the range of all units."""
 _RETURN_M_S = 0.1
@@ -52,8 +51,8 @@ class Stream:
     """(S,) 1 while the reports of all units are recent, else 0."""
     count: IntArray
     """(S,) number of obstacles."""
-    obstacles: dict[str, Any]
-    """Each field of `Obstacles` of all steps, one after the other, (sum of counts, ...)."""
+    obstacles: Obstacles
+    """Those of all steps, one after the other."""
 
     @property
     def stamp(self) -> FloatArray:
@@ -68,13 +67,20 @@ class Stream:
             values: dict[str, Any] = {name: self.robot[name][i] for name in _ROBOT}
             values["stamp"] = float(values["stamp"])
             values["wrench"] = None if np.isnan(wrench[i, 0]) else wrench[i]
-            near = {name: self.obstacles[name][end - number : end] for name in _OBSTACLES}
-            yield RobotState(**values), Obstacles(**near), bool(self.reacting[i]), bool(self.watched[i])
+            near = some_of(self.obstacles, end - number, end)
+            yield RobotState(**values), near, bool(self.reacting[i]), bool(self.watched[i])
+
+    def near(self, see: PerceptionParams | None) -> tuple[Obstacles, IntArray]:
+        """Return the obstacles of all steps as a perception shows them, without a memory what is seen now; counts."""
+        oldest = -1.0 if see is None else np.inf if see.memory else see.persistence_s
+        shown = self.obstacles.age <= oldest
+        count = np.bincount(np.repeat(np.arange(len(self.count)), self.count)[shown], minlength=len(self.count))
+        return Obstacles._make(part[shown] for part in self.obstacles), count
 
     def obstacle_points(self, step: int) -> FloatArray:
         """Return the obstacle points (K, 3) [m] of a step."""
         end = int(self.count[: step + 1].sum())
-        return np.asarray(self.obstacles["point"][end - int(self.count[step]) : end])
+        return self.obstacles.point[end - int(self.count[step]) : end]
 
 
 class StreamRecorder:
@@ -108,7 +114,7 @@ class StreamRecorder:
 
     def stream(self) -> Stream:
         """Return the stored steps."""
-        near = {name: np.concatenate([getattr(o, name) for o in self._obstacles]) for name in _OBSTACLES}
+        near = Obstacles._make(np.concatenate(parts) for parts in zip(*self._obstacles, strict=True))
         count = np.array([len(o.unit) for o in self._obstacles], dtype=np.int64)
         reacting, watched = np.array(self._flags, dtype=np.float64).T
         return Stream(_fields_of(self._robot), reacting.copy(), watched.copy(), count, near)
