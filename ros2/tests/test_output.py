@@ -76,13 +76,14 @@ def test_a_step_is_published_by_standard_messages(published, listener, panda_mod
     assert len(step.obstacles.unit) == 2
     cloud = listener.last("/pretouch/obstacles")
     assert [(f.name, f.offset, f.datatype) for f in cloud.fields] == [
-        ("x", 0, 7), ("y", 4, 7), ("z", 8, 7), ("distance", 12, 7), ("unit", 16, 6),
+        ("x", 0, 7), ("y", 4, 7), ("z", 8, 7), ("distance", 12, 7), ("unit", 16, 6), ("age", 20, 7),
     ]  # fmt: skip
-    rows = np.frombuffer(cloud.data.tobytes(), "<f4").reshape(cloud.width, 5)
-    assert (cloud.width, cloud.point_step, cloud.row_step) == (2, 20, 40)
+    rows = np.frombuffer(cloud.data.tobytes(), "<f4").reshape(cloud.width, 6)
+    assert (cloud.width, cloud.point_step, cloud.row_step) == (2, 24, 48)
     assert rows[:, :3] == pytest.approx(step.obstacles.point, abs=1e-6)
     assert rows[:, 3] == pytest.approx(step.obstacles.body_distance, abs=1e-6)
-    assert rows[:, 4].view("<u4").tolist() == step.obstacles.unit.tolist()
+    assert rows[:, 4].copy().view("<u4").tolist() == step.obstacles.unit.tolist()
+    assert rows[:, 5] == pytest.approx(step.obstacles.age, abs=1e-6)
     force = listener.last("/pretouch/force")
     assert (force.header.frame_id, force.wrench.force.z) == (panda_model.links[0], 3.0)
     assert listener.last("/pretouch/mode").data.startswith("HOLD: The force window is filling")

@@ -13,8 +13,8 @@ from pretouch_ros2.messages import CLOUD, DIAGNOSTICS, STATUS, TRANSFORMS, WRENC
 
 Stamp = tuple[int, int]
 """Seconds and nanoseconds."""
-_POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("distance", "<f4"), ("unit", "<u4")])
-"""An obstacle: position [m], distance from the body's surface [m], and index of the unit in the skin."""
+_POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("distance", "<f4"), ("unit", "<u4"), ("age", "<f4")])
+"""An obstacle: position [m], distance from the body's surface [m], unit that saw it last, and time since then [s]."""
 _FLOAT32, _UINT32 = 7, 6
 """Codes of sensor_msgs/PointField."""
 _OK, _WARN, _ERROR = 0, 1, 2
@@ -36,7 +36,7 @@ class StepMessages:
         points = np.zeros(len(obstacles.point), dtype=_POINT)
         for i, name in enumerate("xyz"):
             points[name] = obstacles.point[:, i]
-        points["distance"], points["unit"] = obstacles.body_distance, obstacles.unit
+        points["distance"], points["unit"], points["age"] = obstacles.body_distance, obstacles.unit, obstacles.age
         fields = [
             self._m.make("sensor_msgs/msg/PointField", name, of[1], _UINT32 if name == "unit" else _FLOAT32, 1)
             for name, of in (_POINT.fields or {}).items()
