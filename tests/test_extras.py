@@ -41,6 +41,7 @@ ASKED = [
     (("skin", "provision", "--id", "a", "--keys", "k.toml", "--ssid", "a", "--host", "::"), None),
     (("skin", "provision", "--id", "a", "--keys", "k.toml", "--ssid", "a", "--host", "10.0.0.1"), UNITS),
     (("skin", "keys", "--keys", "k.toml"), None),
+    (("skin", "check-unit", "--id", "a", "--keys", "gone.toml"), None),
     (("warm-up",), None),
 ]
 SCRIPT = """

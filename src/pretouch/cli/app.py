@@ -28,6 +28,7 @@ COMMANDS: dict[str, dict[str, tuple[str, str]]] = {
     },
     "Sensor units": {
         "skin monitor": ("skin_monitor:Monitor", "watch units: rates, losses, batteries, faults"),
+        "skin check-unit": ("skin_check:CheckUnit", "with a card: bursts, delay, order of zones"),
         "skin calibrate": ("calibrate.command:Calibrate", "find where units sit, from a motion"),
         "skin coverage": ("skin_coverage:MeasureCoverage", "what units see in time, where more help"),
         "skin simulate": ("skin_simulate:Simulate", "send what real units send"),
@@ -113,9 +114,9 @@ def split_name(words: Sequence[str], names: Iterable[str]) -> tuple[str, Sequenc
 
 def overview(names: Iterable[str], first_lines: dict[str, str]) -> str:
     """Return the help on some commands, a line of 80 columns each; those in no group have a line of their own."""
-    lines = ["usage: pretouch COMMAND [OPTIONS]          options: pretouch COMMAND --help"]
+    lines = ['usage: pretouch COMMAND [--help ...]   Tab: eval "$(pretouch completion bash)"']
     groups = {title: {n: line for n, (_, line) in group.items() if n in names} for title, group in COMMANDS.items()}
     for title, group in (groups | {"Added": first_lines}).items():
         for i, (name, line) in enumerate(group.items()):
             lines.append(f"{'' if i else title:<13} {name:<15} {line}"[:80])
-    return "\n".join([*lines, f'{"":<13} completion by Tab:  eval "$(pretouch completion bash)"'])
+    return "\n".join(lines)

@@ -84,7 +84,9 @@ def read_skin(place: Path) -> SkinTrace:
     if not samples:
         raise RecordingError(f"{place} holds no samples of sensor units: {way_out}.")
     joints, names = _joints(place, states)
-    return SkinTrace({unit: _unit(received) for unit, received in samples.items()}, joints, names, contents.complete)
+    return SkinTrace(
+        {unit: unit_trace(received) for unit, received in samples.items()}, joints, names, contents.complete
+    )
 
 
 def _received(place: Path, message: Any, ids: list[str]) -> Received:
@@ -96,7 +98,8 @@ def _received(place: Path, message: Any, ids: list[str]) -> Received:
     return Received(unit, message.arrival, message.stamp, message.offset, message.bound, sample)
 
 
-def _unit(samples: list[Received]) -> UnitTrace:
+def unit_trace(samples: list[Received]) -> UnitTrace:
+    """Return the measurements that the datagrams of one unit hold."""
     batches = []
     for one in samples:
         with suppress(ValueError):  # full scales that the sensor does not have
