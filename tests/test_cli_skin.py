@@ -177,7 +177,7 @@ def test_a_disk_that_is_full_is_said_and_the_exit_code_tells_of_it(keys, port, t
     ],
 )
 def test_bad_input_ends_with_one_sentence_and_code_2(keys, port, tmp_path, capsys, more, words):
-    assert monitor(tmp_path, port, "--once", *more) == 2
+    assert monitor(tmp_path, port, "--duration", "1", *more) == 2
     said = capsys.readouterr()
     assert words in said.err
     assert said.err.count("\n") == 1

@@ -5,11 +5,11 @@ import json
 
 import numpy as np
 
+from pretouch.cli.skin_keys import Network, configuration
 from pretouch.sensing.unit import ACCELERATION_LSB, ANGULAR_RATE_LSB, STANDARD_GRAVITY
 from pretouch.types import RangeStatus
 from pretouch.units import wire
 from pretouch.units.keys import UnitKey
-from pretouch.units.provision import Network, configuration
 from tests.firmware.harness import Run
 
 KEY, CHALLENGE, NONCE = bytes(range(32)), b"challeng", b"nonce678"

@@ -37,7 +37,7 @@ class Desk:
                 at = begun + 0.02 * ranges
                 for k in range(len(self.fleet.ids)):
                     distance = self.distance + 0.003 * self._rng.standard_normal()
-                    self.fleet.take_range(RangeSample(k, at, distance, RangeStatus.OK, 0.004, 5.0, 0.1, 80.0))
+                    self.fleet.take_range(RangeSample(k, at, distance, RangeStatus.OK, 0.004, 0.1))
                 ranges += 1
             while imu <= (now - begun) * IMU_HZ:
                 for k in range(len(self.fleet.ids)):

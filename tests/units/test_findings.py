@@ -53,7 +53,7 @@ WARNINGS = [
     (lambda: found(heard(flags=lambda n: WELL * (n % 2))), "rate", "readings a second (limit 34)"),
     (lambda: found(heard(), counts(400, 100)), "loss", "loses 20% of its samples"),
     (lambda: found(heard(), counts(424, 76)), "loss", "loses 15.2% of its samples in transmission (limit 15%)"),
-    (lambda: found(heard(latency=0.07)), "latency", "in the median 70 ms (limit 50 ms)"),
+    (lambda: found(heard(latency=0.09)), "latency", "in the median 90 ms (limit 80 ms)"),
     (lambda: found(heard(), bound=0.02), "clock", "known only to within 20.0 ms (limit 10 ms)"),
     (lambda: found(heard(), bound=0.01004), "clock", "known only to within 10.04 ms (limit 10 ms)"),
     (lambda: found(heard(), counts(500, 0, 0, 2)), "clock jump", "jumped 2 times"),
@@ -129,7 +129,7 @@ def test_faults_come_before_warnings():
 
 
 def test_a_machine_that_is_late_is_named_first_and_its_units_not_blamed():
-    slow = heard(flags=lambda n: WELL * (n % 10 == 0), range_sigma=80, latency=0.07)
+    slow = heard(flags=lambda n: WELL * (n % 10 == 0), range_sigma=80, latency=0.09)
     assert {f.what for f in found(slow, counts(340, 160), 0.5)} == {"rate", "loss", "latency", "sigma"}
     machine, sigma = found(slow, counts(340, 160), 1.26)
     assert (machine.unit, machine.level, machine.what) == ("this machine", "fault", "machine")

@@ -13,7 +13,7 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import RangeReadings, RangeStatus
-from pretouch.units.model_check import ModelCheck
+from pretouch.units.watch import ModelCheck
 
 UNIT = 0
 FAR = 0.4

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from pretouch import cli
+from pretouch.cli.skin_keys import Network, configuration, copy_to_unit
 from pretouch.errors import HardwareError
 from pretouch.units.keys import UnitKey, load_keys
-from pretouch.units.provision import Network, configuration, copy_to_unit
 
 NETWORK = Network("lab", "192.168.1.10")
 MPREMOTE = """

@@ -30,12 +30,11 @@ from pretouch.units import EVERYWHERE, HOST, PORT
 from pretouch.units.findings import Finding
 from pretouch.units.health import UnitHealth, status_name
 from pretouch.units.keys import load_keys
-from pretouch.units.model_check import ModelCheck
 from pretouch.units.skin import NetworkSkin
 from pretouch.units.skin_recording import SkinRecording
-from pretouch.units.watch import UnitWatch, WatchUpdate
+from pretouch.units.watch import ModelCheck, UnitWatch, WatchUpdate
 
-_ONCE_S, _SECOND_S = 5.0, 1.0
+_SECOND_S = 1.0
 _UPDATE_S = 0.25
 """Time between two updates [s]: as often as a person can read."""
 _COLUMNS = ["unit", "state", "rate\n[Hz]", "loss\n[%]", "latency\n[ms]", "dist.\n[m]", "sigma\n[mm]", "batt.\n[V]"]
@@ -78,15 +77,13 @@ class Monitor:
     """Recording to write: all samples as received, ranges and IMU."""
     duration: float = 0.0
     """Time to watch [s]; 0: until Ctrl-C. The exit code is then 1 if a unit is faulty at the end."""
-    once: bool = False
-    """Watch for 5 s and print one table."""
     json: JsonFile = None
 
     def run(self) -> int:
         """Watch units; return 1 if one is faulty after a given time or recording failed, or else 0."""
         if not (math.isfinite(self.duration) and self.duration >= 0):
             raise HardwareError(f"--duration is {self.duration:g} s: give 0 or more.")
-        duration = self.duration or (_ONCE_S if self.once else math.inf)
+        duration = self.duration or math.inf
         with numbers_to(self.json) as write:
             return _monitored(self, duration, write)
 
@@ -104,7 +101,7 @@ def _monitored(command: Monitor, duration: float, write: Callable[[Any], None]) 
         recording = stack.enter_context(SkinRecording(command.record)) if command.record else None
         updates = UnitWatch(receiver, _UPDATE_S, check, lambda: q).updates(duration)
         try:
-            for update in _shown(updates, receiver, recording, command.once):
+            for update in _shown(updates, receiver, recording):
                 last = update
         except (KeyboardInterrupt, Terminated):
             with suppress(OSError):  # the terminal may be gone
@@ -145,11 +142,11 @@ def _watched(command: Monitor, all_ids: tuple[str, ...]) -> tuple[NetworkUnits, 
 
 
 def _shown(
-    updates: Iterator[WatchUpdate], receiver: NetworkSkin, recording: SkinRecording | None, quiet: bool
+    updates: Iterator[WatchUpdate], receiver: NetworkSkin, recording: SkinRecording | None
 ) -> Iterator[WatchUpdate]:
     """Show, record and yield each update."""
     console, second, before = Console(highlight=False, soft_wrap=True), 0.0, dict[tuple[str, str], str]()
-    live = None if quiet or not console.is_terminal else Live(console=console, auto_refresh=False, transient=True)
+    live = None if not console.is_terminal else Live(console=console, auto_refresh=False, transient=True)
     with live or nullcontext():
         for update in updates:
             full = update.elapsed >= second
@@ -161,7 +158,7 @@ def _shown(
                 if recording:
                     notes.append(recording.trouble or f"Recording {recording.place}: {recording.samples} samples.")
                 live.update(view(update, receiver.traffic().rejected, notes), refresh=True)
-            elif full and not quiet:
+            elif full:
                 before = _print_line(console, update, before)
             yield update
 

@@ -150,8 +150,8 @@ class VL53L5CX(Sensor, name="vl53l5cx"):
     blind_s: NonNegative = 0.86
     """Square to a panel at 0.35 to 0.5 m, 8 x 8 zones (flights of github.com/ETH-PBL/Matrix_ToF_Drones) [s]."""
     delay_s: NonNegative = 0.034
-    """Delay of 4 x 4 zones [s]: half of their 17 ms, and half of the 51 ms by which the last zones of 8 x 8 trail beside
-    that. The flights do not tell how much of the 51 ms is the sensor's: half errs by 25 ms at most."""
+    """Delay of 4 x 4 zones [s]: half of their 17 ms, and half of the 51 ms by which the last zones of 8 x 8 trail
+    besides. The flights do not tell how much of those is the sensor's: half errs by 25 ms at most."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -12,9 +12,8 @@ from pretouch.ports import Arm, Clock, Robot, SkinPort
 from pretouch.sound import sound_robot
 from pretouch.types import FloatArray, RobotState
 from pretouch.units.findings import Finding
-from pretouch.units.model_check import ModelCheck
 from pretouch.units.skin import NetworkSkin
-from pretouch.units.watch import UnitWatch
+from pretouch.units.watch import ModelCheck, UnitWatch
 
 # Figures without a source are ours.
 WATCH_S = 3.0

@@ -77,12 +77,8 @@ class RangeSample(NamedTuple):
     """A `RangeStatus`."""
     sigma: float
     """Standard deviation of the distance [m]; 0 without a target."""
-    signal: float
-    """Rate of the light that came back [Mcps]."""
     ambient: float
-    """Rate of other light [Mcps]."""
-    spads: float
-    """SPADs in use."""
+    """Rate of light that is not the sensor's [Mcps]: it never repeats itself, with a target or without."""
 
 
 Send = Callable[[RangeSample], None]
@@ -190,28 +186,15 @@ class RangeFinders:
             if unit in self._electrodes:
                 row[3:7] = self._electrodes[unit].measure(time, float(row[7]))
             if self._send and unit not in self.silenced:
-                stamp, _, distance, status, sigma, strength = row[1:7].tolist()
-                self._send(RangeSample(unit, stamp, distance, int(status), sigma, *_light(strength, self._light)))
+                stamp, _, distance, status, sigma = row[1:6].tolist()
+                ambient = self._light.poisson(1e6 * _AMBIENT_MCPS * _COUNTED_S) / (1e6 * _COUNTED_S)
+                self._send(RangeSample(unit, stamp, distance, int(status), sigma, ambient))
         if self._send:
             ranging.rows[0] = first
         return until
 
 
-_SIGNAL_LIMIT_MCPS = 1.024
-"""Signal of a target that is just detected [Mcps] (data sheet: readings below 1024 kcps are rejected)."""
 _AMBIENT_MCPS = 0.3
 """Rate of ambient light indoors on all SPADs, of the size that units on a desk report [Mcps]; an assumption."""
-_WANTED_MCPS = 20.0
-"""The sensor uses so many SPADs that all rates together stay below this [Mcps] (its driver's default)."""
-_SPADS = 256
-"""SPADs of the whole array (data sheet)."""
 _COUNTED_S = 0.01
 """Time in which photons are counted [s]: about half of the 20 ms budget; an assumption."""
-
-
-def _light(strength: float, rng: np.random.Generator) -> tuple[float, float, float]:
-    """Rates of signal and ambient light [Mcps], with the photons' noise, and SPADs in use, at a strength of returns."""
-    rates = np.array([_SIGNAL_LIMIT_MCPS * strength, _AMBIENT_MCPS])
-    share = min(1.0, _WANTED_MCPS / float(rates.sum()))
-    signal, ambient = (rng.poisson(1e6 * share * rates * _COUNTED_S) / (1e6 * _COUNTED_S)).tolist()
-    return signal, ambient, _SPADS * share

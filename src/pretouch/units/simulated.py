@@ -279,8 +279,8 @@ class SimulatedUnit:
             unit=self.key.number, flags=int(flags), sequence=0, time_us=self._own(now), beacon=0, beacon_hold_us=0,
             battery_mv=_BATTERY_MV, temperature_cdeg=_TEMPERATURE_CDEG, bus_errors=0, range_stream=self._stream,
             range_status=zone.status, range_mm=_field(zone.distance, 1e3), range_age_us=self._since(zone.time, now),
-            range_sigma=_field(zone.sigma, 4e3), range_signal=_field(zone.signal, 128.0),
-            range_ambient=_field(zone.ambient, 128.0), range_spads=_field(zone.spads, 256.0),
+            range_sigma=_field(zone.sigma, 4e3), range_signal=0, range_ambient=_field(zone.ambient, 128.0),
+            range_spads=0,
             imu_count=count, imu_scale=self._imu_scale, imu_rate_hz=self._imu_rate, imu_index=first,
             imu_age_us=self._since(imu[-1].time, now) if imu else 0,
             imu=b"".join(IMU_SAMPLE.pack(*sample.counts) for sample in imu), touch=touch, zones=zones,
@@ -292,7 +292,7 @@ _SHOWS = [RangeStatus[name] for name in ("OK", "NO_WRAP_CHECK", "MERGED", "MIN_R
 
 
 def _nothing(time: float) -> RangeSample:
-    return RangeSample(0, time, 0.0, RangeStatus.NONE, 0.0, 0.0, 0.0, 0.0)
+    return RangeSample(0, time, 0.0, RangeStatus.NONE, 0.0, 0.0)
 
 
 def _field(value: float, units: float) -> int:

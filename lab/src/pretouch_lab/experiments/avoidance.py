@@ -81,14 +81,9 @@ def visits(place: str, seed: int, placement: Placement = _UNMOVED) -> tuple[Visi
 
 def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row and its record."""
-    where = context.placement
-    person = Visitor(context.model, visits(cell["place"], seed, where))
-    scene, path, sensors = (
-        SceneSpec(hand=HandSpec()),
-        where.path("circle", -1.0),
-        replace(context.ranging, realistic=True),
-    )
-    setup = context.setup(cell, seed, scene, path, hand=person, ranging=sensors)
+    where, sensors = context.placement, replace(context.ranging, realistic=True)
+    person, path = Visitor(context.model, visits(cell["place"], seed, where)), where.path("circle", -1.0)
+    setup = context.setup(cell, seed, SceneSpec(hand=HandSpec()), path, hand=person, ranging=sensors)
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
     steps = record.steps
     off = [float(np.linalg.norm(s.ee_position - s.path_position)) for s in steps]
