@@ -97,7 +97,7 @@ def test_a_reading_that_no_obstacle_is_made_of_is_a_point_only_where_perception_
 def test_remembered_places_fade_and_the_units_glow_that_see_them_now(drawn, some_step):
     places = map_init(4)
     places.number[0], places.place[0], places.place[1] = 3, POINT, -POINT
-    places.unit[:3], places.seen[:3] = (2, 0, -1), some_step.stamp - np.array([0.0, 3.0, 12.0])
+    places.unit[:3], places.stamp[:3] = (2, 0, -1), some_step.stamp - np.array([0.0, 3.0, 12.0])
     nodes = drawn(replace(some_step, range_distance=np.full(7, 0.3)), places=places)
     np.testing.assert_allclose(nodes["/points"].points, [POINT, -POINT, np.zeros(3)], atol=1e-3)
     now, before, long_ago = nodes["/points"].colors.astype(float)

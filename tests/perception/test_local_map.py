@@ -152,7 +152,7 @@ def test_far_away_nothing_is_seen_empty_and_farther_nothing_is_remembered(looker
     for i in range(5):
         assert len(looker.look(1.06 + 0.02 * i, None).unit) == 1
     looker.look(1.2, MAP.mark_m + 0.01)
-    assert len(looker.places.seen) == 1
+    assert len(looker.places.stamp) == 1
 
 
 def test_no_target_counts_after_the_longest_burst_of_its_sensor(panda_model, unit):
@@ -290,12 +290,12 @@ def test_a_full_map_loses_the_oldest_and_takes_the_newest_at_the_next_look(panda
         return looker.take(readings_of(looker.skin, now), now, points=new)
 
     see(1.0, many)
-    assert len(looker.places.seen) == MOST_PLACES
+    assert len(looker.places.stamp) == MOST_PLACES
     hand = TCP + 0.3 * LEFT + 0.0101
     for now in (1.01, 1.02):
         see(now, hand[None])
-    assert len(looker.places.seen) == MOST_PLACES
-    newest = looker.places.seen == 1.02
+    assert len(looker.places.stamp) == MOST_PLACES
+    newest = looker.places.stamp == 1.02
     np.testing.assert_array_equal(looker.places.place[newest], [hand])
 
 

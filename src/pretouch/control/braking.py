@@ -100,12 +100,8 @@ def braking_rows(
             which obstacles must not be touched at any speed, age of a look up to which others must not, and age from
             which they do not count [s].
     """
-    places, s, distance, (touch_speed, deadband, fixtures, young, old) = (
-        len(slots.link),
-        p.curve,
-        near.body_distance,
-        touch,
-    )
+    places, s, distance = len(slots.link), p.curve, near.body_distance
+    touch_speed, deadband, fixtures, young, old = touch
     most, which, present, count = _MOST_ROWS * places, np.empty(places, np.int64), np.zeros(places, np.bool_), 0
     rows = ConstraintRows(np.empty((most, len(chain.qd))), np.empty(most), which, s.slack_weight)
     for m in range(len(near.unit)):
@@ -132,17 +128,11 @@ def braking_rows(
         last = braking_cap(distance[m], speed, s.tighten_m_s2, s.latency_s, s.margin_m) - own
         # Faster than that, smoothness comes second: the limit falls at once. With 0.0 it falls as far as a stop, while
         # a retreat (target < 0) is still approached at the rate of tightening.
-        slots.limit[k] = min(_eased(target, slots.limit[k], approach, p), max(target, last, 0.0))
-        if stops and distance[m] < s.margin_m + _AT_ONCE_M:
-            slots.limit[k] = target
+        limit = min(_eased(target, slots.limit[k], approach, p), max(target, last, 0.0))
+        slots.limit[k] = target if stops and distance[m] < s.margin_m + _AT_ONCE_M else limit
         rows.h[count], which[count] = slots.limit[k], m
-        across = np.inf
-        if distance[m] < p.across.distance_m:
-            # v_t: linear from the slowest at the surface to the task's speed at that distance
-            share = max(0.0, distance[m]) / p.across.distance_m
-            across = p.across.speed_m_s + share * max(0.0, p.fastest_m_s - p.across.speed_m_s)
         # it falls at once here; the deceleration of the arm is bounded where the row is written
-        slots.across[k] = min(across, slots.across[k] + s.loosen_m_s2 * p.period_s)
+        slots.across[k] = min(_limit_across(p, distance[m]), slots.across[k] + s.loosen_m_s2 * p.period_s)
         count += 1
     with_fading = _fading_rows(p, slots, present, chain, rows, count)
     all_rows = _rows_across(p, slots, chain, rows, with_fading)
@@ -172,6 +162,15 @@ def _fading_rows(
         rows.h[count] = max(slots.limit[k], approach - s.tighten_m_s2 * p.period_s)
         count += 1
     return count
+
+
+@kernel
+def _limit_across(p: BrakingNumbers, distance: float) -> float:
+    """Return v_t [m/s]: linear from the slowest at the surface to the task's speed at that distance."""
+    if not distance < p.across.distance_m:
+        return np.inf
+    share = max(0.0, distance) / p.across.distance_m
+    return p.across.speed_m_s + share * max(0.0, p.fastest_m_s - p.across.speed_m_s)
 
 
 @kernel

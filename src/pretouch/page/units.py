@@ -88,7 +88,7 @@ class Units:
             points, age, unit = near.point, near.age, near.unit
         else:
             places, some = frame.places, slice(frame.places.number[0])
-            points, age, unit = places.place[some], frame.step.stamp - places.seen[some], places.unit[some]
+            points, age, unit = places.place[some], frame.step.stamp - places.stamp[some], places.unit[some]
         seeing = self._mask(unit[age <= SEEN_NOW_S]) & np.isfinite(reading)
         marks = [silent, self._mask(near.unit[frame.step.restricted[binding(frame.step)]]), seeing]
         cones = _coloured(marks, palette.CONE)

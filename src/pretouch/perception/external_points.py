@@ -90,8 +90,8 @@ def take_points(
     if not source_stamp[0] < new.heard <= now:
         return
     source_stamp[0], still, count = new.heard, np.zeros(3), places.number[0]
-    seen = np.where(places.unit[:count] < 0, places.seen[:count], -np.inf)
-    before = places.place[:count].copy(), places.velocity[:count].copy(), seen
+    stamps = np.where(places.unit[:count] < 0, places.stamp[:count], -np.inf)
+    before = places.place[:count].copy(), places.velocity[:count].copy(), stamps
     # the arm at the measurement of the points: it may have moved by more than the margin since; the whole arm explains
     # points, the base too, while only moving links have obstacles
     here, moved_to = placed(sight.arm, kin), np.inf
@@ -100,7 +100,7 @@ def take_points(
         if places.unit[m] < 0:  # the source has answered: its silence keeps no point any more
             hidden = gap_to(places.place, m, here) <= p.margin_m + places.spread[m]
             life = max(p.persistence_s, p.hidden_s) if hidden else p.persistence_s
-            places.until[m] = min(places.until[m], places.seen[m] + life)
+            places.until[m] = min(places.until[m], places.stamp[m] + life)
     for m in range(len(new.stamp)):
         stamp, sigma = new.stamp[m], new.sigma[m]
         if not (_is_point(stamp, new.point, m, sigma) and 0.0 <= now - stamp <= p.persistence_s):
@@ -127,18 +127,18 @@ def _follow(places: LocalMap, before: tuple[FloatArray, FloatArray, FloatArray],
     `before` are places, velocities and stamps before the new points, -inf for what units saw. The correction has the
     mean delay of `follow_points`; a point without an earlier place nearby has velocity 0.
     """
-    place, velocity, seen = before
+    place, velocity, stamp = before
     for m in range(places.number[0]):
-        if places.unit[m] >= 0 or (m < len(seen) and places.seen[m] == seen[m]):
+        if places.unit[m] >= 0 or (m < len(stamp) and places.stamp[m] == stamp[m]):
             continue
         nearest, least = -1, np.inf
-        for b in range(len(seen)):
-            dt = places.seen[m] - seen[b]
+        for b in range(len(stamp)):
+            dt = places.stamp[m] - stamp[b]
             apart = separation(place, b, places.place[m])
             if 0.0 < dt <= 3.0 * memory and apart < min(least, FASTEST * dt + JUMP_M):
                 nearest, least = b, apart
         if nearest >= 0:
-            dt = places.seen[m] - seen[nearest]
+            dt = places.stamp[m] - stamp[nearest]
             gain = 1.0 - np.exp(-dt / (2.0 * memory))
             for i in range(3):
                 last = velocity[nearest, i]

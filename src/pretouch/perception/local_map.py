@@ -38,7 +38,7 @@ class LocalMap(NamedTuple):
     """(N, 3) centres of balls; of outside points, the points themselves [m]."""
     velocity: Annotated[FloatArray, "N", 3]
     """(N, 3) of the object at the last look [m/s]."""
-    seen: Annotated[FloatArray, "N"]
+    stamp: Annotated[FloatArray, "N"]
     """(N,) stamp of the last look that showed it [s]."""
     until: Annotated[FloatArray, "N"]
     """(N,) instant until which it is remembered [s]."""
@@ -62,7 +62,7 @@ def map_init(room: int) -> LocalMap:
 
 
 class Look(NamedTuple):
-    """What one reading shows of one place."""
+    """One reading as it shows one place."""
 
     stamp: float
     """[s]"""
@@ -96,18 +96,18 @@ def remember(places: LocalMap, at: FloatArray, velocity: FloatArray, look: Look,
     while m < places.number[0] and places.cell[m] != cell:
         m += 1
     if m == places.number[0]:
-        if m == len(places.seen):
-            oldest = places.seen.argmin()
-            if places.seen[oldest] < look.stamp:  # it goes, and the next look finds room
-                places.looks[oldest], places.seen[oldest] = 0, np.inf
+        if m == len(places.stamp):
+            oldest = places.stamp.argmin()
+            if places.stamp[oldest] < look.stamp:  # it goes, and the next look finds room
+                places.looks[oldest], places.stamp[oldest] = 0, np.inf
             return
         places.number[0] += 1
-        places.cell[m], places.looks[m], places.seen[m], places.width[m] = cell, 0, -np.inf, look.width
-    if not (look.stamp > places.seen[m] or look.width < places.width[m]):
+        places.cell[m], places.looks[m], places.stamp[m], places.width[m] = cell, 0, -np.inf, look.width
+    if not (look.stamp > places.stamp[m] or look.width < places.width[m]):
         return
-    if look.stamp > places.seen[m]:
+    if look.stamp > places.stamp[m]:
         places.looks[m] = min(p.looks, places.looks[m] + 1)
-    places.seen[m], places.width[m], places.spread[m] = look.stamp, look.width, look.spread
+    places.stamp[m], places.width[m], places.spread[m] = look.stamp, look.width, look.spread
     places.until[m], places.unit[m] = look.stamp + look.lasts[min(places.looks[m], 2) - 1], look.unit
     places.empty_since[m] = np.inf
     for i in range(3):
@@ -118,7 +118,7 @@ def remember(places: LocalMap, at: FloatArray, velocity: FloatArray, look: Look,
 def replace_wider(places: LocalMap, at: FloatArray, stamp: float, width: float) -> None:
     """Take a look off each place near `at` (3,) [m] that a clearly wider look saw earlier: it was seen here now."""
     for m in range(places.number[0]):
-        wider = places.width[m] > 1.5 * width + 0.01 and places.seen[m] < stamp
+        wider = places.width[m] > 1.5 * width + 0.01 and places.stamp[m] < stamp
         if wider and separation(places.place, m, at) < min(places.width[m], 0.1) + _WIDE_M:
             places.looks[m] = max(0, places.looks[m] - 1)
 
@@ -129,14 +129,14 @@ def confirm(places: LocalMap, position: FloatArray, beam: FloatArray, reach: flo
 
     `position` (3,) [m] and `beam` (3,) are the sensor's. Return whether there is such a place.
     """
-    known, to = False, np.empty(3)
+    there, to = False, np.empty(3)
     for m in range(places.number[0]):
         for i in range(3):
             to[i] = places.place[m, i] - position[i]
         if places.looks[m] > 0 and dot(to, to) < reach * reach and dot(to, beam) > 0.0:
-            places.seen[m], known = max(places.seen[m], look.stamp), True
+            places.stamp[m], there = max(places.stamp[m], look.stamp), True
             places.until[m], places.empty_since[m] = max(places.until[m], look.stamp + look.lasts[1]), np.inf
-    return known
+    return there
 
 
 @inlined
@@ -170,7 +170,7 @@ def carve(
                 along = to[0] * rotation[k, 0, 2] + to[1] * rotation[k, 1, 2] + to[2] * rotation[k, 2, 2]
                 if along > best:
                     best, at = along, k
-            if away < end[at] and best > inside * away and places.seen[m] < stamp[at]:
+            if away < end[at] and best > inside * away and places.stamp[m] < stamp[at]:
                 places.empty_since[m] = min(places.empty_since[m], stamp[at])
                 if stamp[at] - places.empty_since[m] >= wait[at]:
                     places.looks[m] = max(0, places.looks[m] - 1)
@@ -187,7 +187,7 @@ def forget(places: LocalMap, now: float) -> None:
         last = places.number[0] - 1
         for i in range(3):
             places.place[m, i], places.velocity[m, i] = places.place[last, i], places.velocity[last, i]
-        places.seen[m], places.until[m], places.looks[m] = places.seen[last], places.until[last], places.looks[last]
+        places.stamp[m], places.until[m], places.looks[m] = places.stamp[last], places.until[last], places.looks[last]
         places.width[m], places.spread[m], places.unit[m] = places.width[last], places.spread[last], places.unit[last]
         places.empty_since[m], places.cell[m] = places.empty_since[last], places.cell[last]
         places.number[0] = last
@@ -227,7 +227,7 @@ def nearest_places(
         if places.unit[m] >= 0:
             distance[m] -= p.fist_m
         elif distance[m] <= hidden_m:
-            places.until[m] = max(places.until[m], min(now + lives[0], places.seen[m] + lives[1]))
+            places.until[m] = max(places.until[m], min(now + lives[0], places.stamp[m] + lives[1]))
         if distance[m] < p.mark_m:
             candidates[some] = m
             some += 1
@@ -257,7 +257,7 @@ def nearest_places(
 def _write(places: LocalMap, near: Obstacles, m: int, now: float, radius: float, room: Obstacles) -> None:
     """Write place m, a ball of a radius [m], as the obstacle."""
     room.link[0], room.body_distance[0] = near.link[m], near.body_distance[m]
-    room.age[0], speed = now - places.seen[m], 0.0
+    room.age[0], speed = now - places.stamp[m], 0.0
     for i in range(3):
         room.point[0, i] = near.point[m, i] - radius * near.direction[m, i]
         room.body_point[0, i], room.direction[0, i] = near.body_point[m, i], near.direction[m, i]

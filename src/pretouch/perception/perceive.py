@@ -174,14 +174,14 @@ def _take_readings(
 @inlined
 def _remember_readings(
     sight: Sight, memory: tuple[TrackState, LocalMap], stamp: FloatArray, distance: FloatArray,
-    flags: tuple[BoolArray, BoolArray], seen: tuple[Sensors, FloatArray], lives: FloatArray,
+    flags: tuple[BoolArray, BoolArray], views: tuple[Sensors, FloatArray], lives: FloatArray,
 ) -> None:  # fmt: skip
     """Remove the places that new readings (K,) show empty, and remember what they show.
 
-    `flags` (K,) mark new readings with information, and those of obstacles; `seen` are the poses of the sensors at
+    `flags` (K,) mark new readings with information, and those of obstacles; `views` are the poses of the sensors at
     their measurements, and the points (K, 3) [m].
     """
-    (tracks, places), (young, shows), (sensors, points), p = memory, flags, seen, sight.memory
+    (tracks, places), (young, shows), (sensors, points), p = memory, flags, views, sight.memory
     cones, free, wait, at = sight.skin.cones, np.full(len(stamp), -np.inf), np.zeros(len(stamp)), np.empty(3)
     for k in range(len(stamp)):
         if young[k] and not np.isnan(distance[k]):

@@ -75,8 +75,8 @@ class ProgressReporter:
             summary.holds[reason] = summary.holds.get(reason, 0.0) + self._period
         account = explain(step, *self._names)
         waits = account.doing is Doing.WAITING
-        part = {Mode.HOLD: step.event, Mode.REACT: account.doing, Mode.TRACK: waits}[step.mode]
-        kind = (step.mode, part, resumable(step))
+        parts: dict[Mode, Event | Doing | bool] = {Mode.HOLD: step.event, Mode.REACT: account.doing, Mode.TRACK: waits}
+        kind = (step.mode, parts[step.mode], resumable(step))
         if kind == self._kind:
             if step.stamp >= self._line_due:
                 self._say(step, account.sentence)

@@ -73,9 +73,9 @@ class Stream:
     def near(self, see: PerceptionParams | None) -> tuple[Obstacles, IntArray]:
         """Return the obstacles of all steps as a perception shows them, without a memory what is seen now; counts."""
         oldest = -1.0 if see is None else np.inf if see.memory else see.persistence_s
-        shown = self.obstacles.age <= oldest
-        count = np.bincount(np.repeat(np.arange(len(self.count)), self.count)[shown], minlength=len(self.count))
-        return Obstacles._make(part[shown] for part in self.obstacles), count
+        recent = self.obstacles.age <= oldest
+        count = np.bincount(np.repeat(np.arange(len(self.count)), self.count)[recent], minlength=len(self.count))
+        return Obstacles._make(part[recent] for part in self.obstacles), count
 
     def obstacle_points(self, step: int) -> FloatArray:
         """Return the obstacle points (K, 3) [m] of a step."""
