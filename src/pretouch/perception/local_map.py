@@ -124,19 +124,18 @@ def replace_wider(places: LocalMap, at: FloatArray, stamp: float, width: float) 
 
 
 @kernel
-def confirm(places: LocalMap, position: FloatArray, beam: FloatArray, reach: float, look: Look) -> bool:
-    """Note a look at something nearer than a sensor measures: at the places within `reach` [m] ahead of it.
+def height_over(places: LocalMap, position: FloatArray, beam: FloatArray, reach: float) -> float:
+    """Return the least height [m] along a beam (3,) of the places within `reach` [m] ahead of a sensor, else `reach`.
 
-    `position` (3,) [m] and `beam` (3,) are the sensor's. Return whether there is such a place.
+    A sensor at `position` (3,) [m] that only tells that something is nearer than it measures may show one of these.
     """
-    there, to = False, np.empty(3)
+    least, to = reach, np.empty(3)
     for m in range(places.number[0]):
         for i in range(3):
             to[i] = places.place[m, i] - position[i]
         if places.looks[m] > 0 and dot(to, to) < reach * reach and dot(to, beam) > 0.0:
-            places.stamp[m], there = max(places.stamp[m], look.stamp), True
-            places.until[m], places.empty_since[m] = max(places.until[m], look.stamp + look.lasts[1]), np.inf
-    return there
+            least = min(least, dot(to, beam))
+    return least
 
 
 @inlined

@@ -6,15 +6,7 @@ import numpy as np
 
 from pretouch.compiled import inlined, kernel
 from pretouch.perception.closest import closest
-from pretouch.perception.local_map import (
-    LocalMap,
-    Look,
-    carve,
-    confirm,
-    nearest_places,
-    remember,
-    replace_wider,
-)
+from pretouch.perception.local_map import LocalMap, Look, carve, height_over, nearest_places, remember, replace_wider
 from pretouch.perception.motion_compensation import follow_points, move_back
 from pretouch.perception.obstacles import (
     Sight,
@@ -167,21 +159,21 @@ def _take_readings(
         # it uses the last points, before `update_tracks` overwrites them
         follow_points(tracks, points, stamp, fresh & shows, sight.memory.closing_s)
         young = fresh & informative & (now - stamp <= lives)
-        _remember_readings(sight, memory, stamp, distance, (young, shows), (sensors, points), lives)
+        _remember_readings(sight, memory, stamp, distance, (young, shows), sensors, lives)
     update_tracks(tracks, stamp, points, (fresh, shows, informative))
 
 
 @inlined
 def _remember_readings(
     sight: Sight, memory: tuple[TrackState, LocalMap], stamp: FloatArray, distance: FloatArray,
-    flags: tuple[BoolArray, BoolArray], views: tuple[Sensors, FloatArray], lives: FloatArray,
+    flags: tuple[BoolArray, BoolArray], sensors: Sensors, lives: FloatArray,
 ) -> None:  # fmt: skip
     """Remove the places that new readings (K,) show empty, and remember what they show.
 
-    `flags` (K,) mark new readings with information, and those of obstacles; `views` are the poses of the sensors at
-    their measurements, and the points (K, 3) [m].
+    `flags` (K,) mark new readings with information, and those of obstacles; `sensors` are placed as at their
+    measurements.
     """
-    (tracks, places), (young, shows), (sensors, points), p = memory, flags, views, sight.memory
+    (tracks, places), (young, shows), p = memory, flags, sight.memory
     cones, free, wait, at = sight.skin.cones, np.full(len(stamp), -np.inf), np.zeros(len(stamp)), np.empty(3)
     for k in range(len(stamp)):
         if young[k] and not np.isnan(distance[k]):
@@ -193,16 +185,15 @@ def _remember_readings(
     for k in range(len(stamp)):
         if not (young[k] and shows[k] and distance[k] <= p.mark_m):
             continue
-        kind, velocity = cones.kind[k], np.zeros(3)
+        kind, beam, velocity = cones.kind[k], sensors.rotation[k, :, 2], tracks.motion[1, k].copy()
+        height = distance[k] + p.fist_m
+        if distance[k] <= cones.range[kind, 0]:
+            # a target at the minimum may be anywhere before it: it is as near as it was seen before
+            height = height_over(places, sensors.position[k], beam, height)
         for i in range(3):
-            at[i] = points[k, i] + p.fist_m * sensors.rotation[k, i, 2]
-            velocity[i] = tracks.motion[1, k, i]
+            at[i] = sensors.position[k, i] + height * beam[i]
         turned = np.sqrt(sight.skin.orientation_sigma[k] ** 2 + cones.spread[kind] ** 2)
         u = spread(sight.sigmas, sight.skin.position_sigma[k], turned, distance[k])
         width = distance[k] * cones.edge[kind, 2]
-        look, least = Look(stamp[k], (lives[k], p.kept_s), width, u, k), cones.range[kind, 0]
-        beam = sensors.rotation[k, :, 2]
-        # a target at the minimum may be anywhere before it: it is where it was seen before
-        if distance[k] > least or not confirm(places, sensors.position[k], beam, least + p.fist_m, look):
-            replace_wider(places, at, stamp[k], width)
-            remember(places, at, velocity, look, p)
+        replace_wider(places, at, stamp[k], width)
+        remember(places, at, velocity, Look(stamp[k], (lives[k], p.kept_s), width, u, k), p)

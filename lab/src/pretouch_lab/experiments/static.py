@@ -5,6 +5,8 @@ from itertools import product
 
 import numpy as np
 
+from pretouch.composition import changed
+from pretouch.control.approach import BrakingCurve
 from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.plant import Plant
 from pretouch.text_table import TextTable
@@ -39,7 +41,11 @@ def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row and its record."""
     trajectory, side, where = cell["trajectory"], cell["side"], context.placement
     scene = static_scene(trajectory, side, cell["stiffness_n_per_m"], seed, where)
-    record = play(context.setup(cell, seed, scene, static_path(trajectory, side, where)), done_after_contact())
+    profile = context.profile(cell)
+    if isinstance(profile.approach, BrakingCurve):  # a task that wants contact: nothing is left untouched
+        profile = changed(profile, {"approach.untouched_s": "0"})
+    path = static_path(trajectory, side, where)
+    record = play(context.setup(cell, seed, scene, path, profile=profile), done_after_contact())
     return results(record, -1.0 if side == "+y" else 1.0, context.model.links), record
 
 
