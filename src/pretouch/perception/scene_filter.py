@@ -103,12 +103,12 @@ def leave_out(
     spheres, points = bounds(capsules), locate(sensors.position, sensors.rotation, distance)
     for k in range(len(shows)):
         end = ends[k]
+        if fresh[k] and shows[k] and aside > 0:  # first, for casting rays takes longer
+            beside = distance[k] * cones.edge[cones.kind[k], 2] + aside
+            shows[k] = gap_to(points, k, capsules, sensors.link[k]) > beside
         if fresh[k] and shows[k]:
             # a farther return does not explain the reading, and the first one within is enough
             shows[k] = capsule_return(sensors, k, capsules, spheres, cones, end, end) > end
-        if fresh[k] and shows[k] and aside > 0:
-            beside = distance[k] * cones.edge[cones.kind[k], 2] + aside
-            shows[k] = gap_to(points, k, capsules, sensors.link[k]) > beside
 
 
 @compiled
