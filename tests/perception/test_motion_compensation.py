@@ -7,8 +7,7 @@ import pytest
 from tests.perception.watcher import Watcher, readings_of
 
 from pretouch.params import PerceptionParams
-from pretouch.perception.motion_compensation import follow_points, move_back
-from pretouch.perception.obstacles import placed_sensors, track_init
+from pretouch.perception.obstacles import follow_points, move_back, placed_sensors, track_init
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
 from pretouch.robot.kinematics import Chain

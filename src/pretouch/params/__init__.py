@@ -43,9 +43,8 @@ class LocalMapParams(Checked):
     per_link: PositiveCount = 6
     """Number of obstacles for each moving link, in different directions from it."""
     closing_s: Positive = 0.09
-    """Time in which the weight of a reading in the estimate of an object's own speed falls by 1/e [s]. A change of
-    speed is followed to half in 0.14 s and to nine tenths in 0.34 s; a range noise of 20 mm at 50 Hz leaves 0.05 m/s.
-    """
+    """Time in which the weight of a reading in the estimate of an object's own speed falls by 1/e [s]: a change is
+    followed to half in 0.14 s and to nine tenths in 0.34 s; a range noise of 20 mm at 50 Hz leaves 0.05 m/s."""
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ import numpy as np
 from pretouch.compiled import compiled, kernel
 from pretouch.params import OutsidePoints
 from pretouch.perception.local_map import LocalMap, Look, remember
-from pretouch.perception.motion_compensation import FASTEST, JUMP_M
-from pretouch.perception.obstacles import Sight, speed_factor
+from pretouch.perception.obstacles import FASTEST, JUMP_M, Sight, speed_factor
 from pretouch.robot.body import Capsules, gap_to, placed
 from pretouch.robot.kinematics import Chain, Kinematics, dot, point_velocity, separation
 from pretouch.types import FloatArray, SeenPoints

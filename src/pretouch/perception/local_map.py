@@ -13,11 +13,12 @@ import numpy as np
 from pretouch.compiled import inlined, kernel
 from pretouch.params import LocalMapParams
 from pretouch.perception.closest import closest
-from pretouch.perception.motion_compensation import FASTEST
+from pretouch.perception.obstacles import FASTEST
 from pretouch.records import IntCell, zeros
 from pretouch.robot.body import Capsules
 from pretouch.robot.kinematics import dot, separation
-from pretouch.sensing.sensor import Cones, Sensors
+from pretouch.sensing.sensor import Sensors
+from pretouch.sensing.skin import SkinArrays
 from pretouch.types import FloatArray, IntArray, Obstacles, no_obstacles, some_of
 
 MOST_PLACES = 512
@@ -140,23 +141,21 @@ def height_over(places: LocalMap, position: FloatArray, beam: FloatArray, reach:
 
 @inlined
 def carve(
-    places: LocalMap, sensors: Sensors, first: IntArray, cones: Cones,
-    looks: tuple[FloatArray, FloatArray, FloatArray], most: float,
-) -> None:  # fmt: skip
+    places: LocalMap, sensors: Sensors, skin: SkinArrays, looks: tuple[FloatArray, FloatArray, FloatArray], most: float
+) -> None:
     """Take a look off each place that a unit sees empty after it was last seen.
 
-    Each place is looked up in the zone that looks at it. `first` (B + 1,) is the first zone of each mounted unit, and
-    the number of zones; `looks` are the stamp of each zone's (K,) [s], the distance (K,) [m] up to which nothing is
-    along its beam, -inf where nothing is told, and the time (K,) [s] for which a place must be seen so before that
-    counts; places beyond `most` [m] stay.
+    Each place is looked up in the zone that looks at it. `looks` are the stamp of each zone's (K,) [s], the distance
+    (K,) [m] up to which nothing is along its beam, -inf where nothing is told, and the time (K,) [s] for which a place
+    must be seen so before that counts; places beyond `most` [m] stay.
     """
-    (position, rotation, _), (stamp, end, wait), to = sensors, looks, np.empty(3)
+    (position, rotation, _), (stamp, end, wait), first, to = sensors, looks, skin.first, np.empty(3)
     for b in range(len(first) - 1):
         k0, k1, farthest = first[b], first[b + 1], first[b]
         for k in range(k0, k1):
             farthest = k if end[k] > end[farthest] else farthest
         # a single cone misses at its edge what fills little of it: half of the cone sees a place empty
-        edge = cones.edge[cones.kind[k0], 0]
+        edge = skin.cones.edge[skin.cones.kind[k0], 0]
         inside = edge if k1 - k0 > 1 else math.sqrt((1.0 + edge) / 2.0)
         for m in range(places.number[0]):
             away = separation(places.place, m, position[farthest])

@@ -7,14 +7,15 @@ import numpy as np
 from pretouch.compiled import inlined, kernel
 from pretouch.perception.closest import closest
 from pretouch.perception.local_map import LocalMap, Look, carve, height_over, nearest_places, remember, replace_wider
-from pretouch.perception.motion_compensation import follow_points, move_back
 from pretouch.perception.obstacles import (
     Sight,
     TrackState,
     bring_nearer,
+    follow_points,
     is_informative,
     locate,
     measured,
+    move_back,
     newer,
     pose_into,
     spread,
@@ -181,7 +182,7 @@ def _remember_readings(
         elif young[k]:
             # no target: that has to last longer than a burst of a sensor that misses one
             free[k], wait[k] = cones.range[cones.kind[k], 1], cones.timing[cones.kind[k], 0]
-    carve(places, sensors, sight.skin.first, cones, (stamp, free, wait), p.carve_m)
+    carve(places, sensors, sight.skin, (stamp, free, wait), p.carve_m)
     for k in range(len(stamp)):
         if not (young[k] and shows[k] and distance[k] <= p.mark_m):
             continue
