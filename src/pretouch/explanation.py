@@ -23,7 +23,7 @@ _PRESSED = 1e-9
 """Multiplier above which a limit is active."""
 OFF_PATH_M = 0.01
 """Distance from the path at which the arm is off it [m]; an arm that follows the path stays closer."""
-_REST_M_S = 0.015
+_REST_M_S = 0.02
 """Measured speed of the end-effector below which it is at rest [m/s]; the rest is noise."""
 _REST_RAD_S = 0.01
 """Largest commanded joint velocity of an arm that is held still [rad/s]: 5 mm/s at half a metre."""

@@ -81,7 +81,7 @@ def legend() -> str:
     """Legend of the colours in space, as HTML."""
     marks = "".join(_mark(name, css(colour), 14, 4, 2) for name, colour in _LINES.items())
     marks += _mark("closest pair", css(PAIR), 14, 2, 0) + _mark("silent unit", css(UNIT_SILENT), 8, 8, 1)
-    for name, colours in {"seen now, and before": REMEMBERED, "contact expected": EXPECTED}.items():
+    for name, colours in {"sensed, and remembered": REMEMBERED, "contact expected": EXPECTED}.items():
         marks += _mark(name, f"linear-gradient(90deg,{','.join(map(css, colours))})", 46, 8, 4)
     return f"<div style='padding:4px 12px 10px;font-size:11px;display:flex;flex-wrap:wrap;gap:3px 12px'>{marks}</div>"
 
