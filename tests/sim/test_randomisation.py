@@ -76,7 +76,7 @@ def test_what_an_experiment_varies_stays():
         ("[plant.mass_error]\nvalue = 'much'\n", "give a number"),
         ("[plant.ripple_nm]\nvalue = 0.1\n", "give a list of numbers"),
         ("[plant.offsets_nm]\nvalue = [nan]\n", "give a list of numbers"),
-        ("[ranging.mode]\nvalue = 'wide'\n", "choose one of short, long"),
+        ("[ranging.realistic]\nvalue = 'wide'\n", "must be true or false"),
         ("[plant.payload_kg]\nvalue = [0.5]\n", "give a number"),
         ("[plant.payload_kg]\nuniform = [0.9, 1.1]\ntimes = true\n", "no usual value that it could be a factor on"),
         ("nothing", "not valid TOML"),

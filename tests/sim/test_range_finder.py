@@ -36,10 +36,8 @@ def test_each_unit_has_its_own_constant_offset(rig):
     assert np.std(means[0]) == pytest.approx(0.01 / np.sqrt(3.0), rel=0.25)  # uniform
 
 
-@pytest.mark.parametrize(
-    ("told", "rate"), [({"mode": "short"}, 50.0), ({"mode": "long"}, 7.14), ({"rate_hz": 10.0}, 10.0)]
-)
-def test_units_measure_at_the_rate_of_their_mode_or_as_told_each_at_its_own_phase(rig, told, rate):
+@pytest.mark.parametrize(("told", "rate"), [({}, 50.0), ({"rate_hz": 10.0}, 10.0)])
+def test_units_measure_at_the_rate_of_their_type_or_as_told_each_at_its_own_phase(rig, told, rate):
     readings = rig(wall(0.5), units=10, **told, dropout=0.0, jitter_s=0.0).collect(3.0)
     phases = []
     for unit in range(10):
@@ -71,18 +69,11 @@ def test_a_sensor_of_another_type_measures_at_its_own_rate_and_range(rig, distan
 
 
 @pytest.mark.parametrize(
-    ("mode", "distance", "status"),
-    [
-        ("short", 0.03, RangeStatus.MIN_RANGE),
-        ("short", 0.05, RangeStatus.OK),
-        ("short", 1.2, RangeStatus.OK),
-        ("short", 1.35, RangeStatus.SIGNAL),
-        ("long", 1.5, RangeStatus.OK),
-        ("long", 4.1, RangeStatus.SIGNAL),
-    ],
+    ("distance", "status"),
+    [(0.03, RangeStatus.MIN_RANGE), (0.05, RangeStatus.OK), (1.2, RangeStatus.OK), (1.35, RangeStatus.SIGNAL)],
 )
-def test_the_status_says_what_a_distance_is_worth(rig, mode, distance, status):
-    readings = rig(wall(distance), mode=mode, **EXACT).collect(0.4)
+def test_the_status_says_what_a_distance_is_worth(rig, distance, status):
+    readings = rig(wall(distance), **EXACT).collect(0.4)
     assert len(readings["status"]) >= 2
     assert np.all(readings["status"] == status)
 
@@ -165,7 +156,7 @@ def test_units_err_as_changed_from_then_on(rig):
     assert (noisy["seen"] - noisy["stamp"]).min() > 0.099
 
 
-@pytest.mark.parametrize("mounted", [{"mode": "long"}, {"rings": 3}, {"offset_max_m": 0.02}])
+@pytest.mark.parametrize("mounted", [{"realistic": True}, {"rings": 3}, {"offset_max_m": 0.02}])
 def test_what_was_settled_when_the_units_were_mounted_stays(rig, mounted):
     finders = rig(wall(0.5)).finders
     with pytest.raises(ParameterError, match=f"{next(iter(mounted))} cannot change while the sensors run"):

@@ -83,8 +83,7 @@ class CoverageParams(Checked):
 
     def seen_by(self, sensor: Sensor) -> tuple[float, float, int]:
         """Return farthest target [m], `light_m2` and `run` of a sensor: these parameters are the VL53L1X's."""
-        own, usual = sensor.ranging("short"), PAPER_SENSOR.ranging("short")
-        farther, slower = own.distance_max_m / usual.distance_max_m, own.period_s / usual.period_s
+        farther, slower = sensor.grey_m / PAPER_SENSOR.grey_m, sensor.timing[2] / PAPER_SENSOR.timing[2]
         return self.range_m * farther, self.light_m2 * farther**2, _steps(self.reading_m * slower)
 
     @property

@@ -21,16 +21,6 @@ _Zones = Annotated[int, Check(low=1, high=MOST_ZONES)]
 
 
 @dataclass(frozen=True)
-class RangingMode:
-    """A distance mode of a sensor, with a suitable timing budget."""
-
-    period_s: float
-    """Time between readings: timing budget plus overhead [s]."""
-    distance_max_m: float
-    """Farthest target [m]."""
-
-
-@dataclass(frozen=True)
 class Sensor(Part, group="pretouch.sensors"):
     """A range finder with one cone about its axis, or a square of zones that each measure a distance.
 
@@ -67,14 +57,15 @@ class Sensor(Part, group="pretouch.sensors"):
                 " measure farther than its nearest distance."
             )
 
-    def ranging(self, mode: str) -> RangingMode:
-        """Return one of its distance modes; a sensor without modes has a single one."""
-        return RangingMode(1.0 / self.rate_hz, self.farthest_m)
+    @property
+    def grey_m(self) -> float:
+        """Distance at which a grey target that fills the cone is just visible [m]."""
+        return self.farthest_m
 
     @property
     def timing(self) -> tuple[float, float, float]:
-        """`blind_s`, the delay of the middle of a reading, and the period in the fastest mode [s]."""
-        return self.blind_s, self.delay_s, self.ranging("short").period_s
+        """`blind_s`, the delay of the middle of a reading, and the time between readings [s]."""
+        return self.blind_s, self.delay_s, 1.0 / self.rate_hz
 
     @property
     def label(self) -> str:
@@ -113,10 +104,6 @@ def _rotation_to(beam: FloatArray) -> FloatArray:
     ])  # fmt: skip
 
 
-_MODES = {"short": RangingMode(period_s=0.02, distance_max_m=1.3), "long": RangingMode(0.14, 4.0)}
-"""50 Hz are available in short mode only; four metres need a budget of 140 ms (data sheet DS12385)."""
-
-
 @dataclass(frozen=True)
 class VL53L1X(Sensor, name="vl53l1x"):
     """ST's time-of-flight sensor of the paper (data sheet DS12385: 16 x 16 SPADs, 27 degrees, 4 cm to 4 m).
@@ -128,10 +115,10 @@ class VL53L1X(Sensor, name="vl53l1x"):
     delay_s: NonNegative = 0.0075
     """Half of the 15 ms in which our firmware lets it measure: what it needs besides is not known [s]."""
 
-    def ranging(self, mode: str) -> RangingMode:
-        """See `Sensor`; modes are short and long."""
-        own, fastest = _MODES[mode], 1.0 / self.rate_hz
-        return RangingMode(max(own.period_s, fastest), min(own.distance_max_m, self.farthest_m))
+    @property
+    def grey_m(self) -> float:
+        """See `Sensor`; the short mode's, which 50 Hz need."""
+        return min(1.3, self.farthest_m)
 
 
 @dataclass(frozen=True)
@@ -158,23 +145,22 @@ class VL53L5CX(Sensor, name="vl53l5cx"):
         if self.zones not in _FASTEST_HZ:
             raise ParameterError(f"{type(self).__name__}.zones is {self.zones}: it measures 4 x 4 or 8 x 8.")
 
-    def ranging(self, mode: str) -> RangingMode:
-        """See `Sensor`; mode short is that of the paper's skins, whose range is enough."""
-        rate = min(self.rate_hz, _FASTEST_HZ[self.zones])
-        return RangingMode(1.0 / rate, min(_GREY_M[self.zones], self.farthest_m))
+    @property
+    def grey_m(self) -> float:
+        """See `Sensor`."""
+        return min(_GREY_M[self.zones], self.farthest_m)
 
     @property
     def timing(self) -> tuple[float, float, float]:
         """See `Sensor`; 8 x 8 are measured in four parts, one after another, each as long as a measurement of 4 x 4."""
-        blind_s, delay_s, period_s = super().timing
-        return blind_s, delay_s + (1.5 / _FASTEST_HZ[4] if self.zones == 8 else 0.0), period_s
+        delay_s = self.delay_s + (1.5 / _FASTEST_HZ[4] if self.zones == 8 else 0.0)
+        return self.blind_s, delay_s, 1.0 / min(self.rate_hz, _FASTEST_HZ[self.zones])
 
 
 _FASTEST_HZ = {4: 60.0, 8: 15.0}
 """Most frames a second (data sheet)."""
 _GREY_M = {4: 1.7, 8: 1.2}
-"""Distance at which a grey target that fills a zone is just visible [m]: ours, less than the 4 m of a white one in the
-dark imply; to be measured with the sensor in use."""
+"""Ours, less than the 4 m of a white target in the dark imply; to be measured with the sensor in use [m]."""
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ class Flaws(NamedTuple):
     """Distance below which numbers are wrong without an error [m]: by up to that too far, an assumption
     (piwars.abstracthorizon.org/posts/2019/02/10/vl53l1x_tof_sensor)."""
     seen_m: float = 0.0
-    """Distance at which half of the readings of a wall of reflectance 0.5 are valid [m]; 0: all of the mode's."""
+    """Distance at which half of the readings of a wall of reflectance 0.5 are valid [m]; 0: all up to `grey_m`."""
 
 
 # noise: 4 mm at 0.35 to 1 m, 8.5 mm at 2.2 m; bursts nearer than 0.2 m: as at 0.2 m, an assumption

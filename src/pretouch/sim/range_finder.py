@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -25,16 +25,14 @@ class RangeFinderParams(Checked):
     realistic: bool = False
     """True if each type errs as recordings of real ones show (`sim.flaws`), in place of a kinder sensor that only has
     noise and a constant error: bursts and losses of "no target", delays by zone, offsets, false statuses."""
-    mode: Literal["short", "long"] = "short"
-    """Distance mode."""
     rate_hz: NonNegative = 0.0
-    """Readings of each unit in a second [Hz]; 0: as often as the mode allows, 50 in short mode and 7 in long mode."""
+    """Readings of each unit in a second [Hz]; 0: as often as its type allows."""
     rings: int = 2
     """Circles of rays that fill the cone; 2 make 19 rays."""
     reflectance: Fraction = 0.5
     """Diffuse reflectance of all surfaces at 940 nm; skin and light cloth reach 0.5 and more."""
     reflectance_limit: Positive = 0.17
-    """Reflectance of a target that fills the cone and is just seen at the mode's greatest distance (sheet: grey)."""
+    """Reflectance of a target that fills the cone and is just seen at `Sensor.grey_m` (sheet: grey)."""
     slant_power: Positive = 1.0
     """Power of the cosine of incidence by which returns weaken: 1 for matt surfaces (Lambert), greater for glossy ones,
     which throw light back in a lobe (Phong's exponent). An assumption where it is not 1."""
@@ -61,7 +59,7 @@ class RangeFinderParams(Checked):
 
     def period_of(self, sensor: Sensor) -> float:
         """Time between readings of a unit with a sensor [s]."""
-        return self.period_factor * (1.0 / self.rate_hz if self.rate_hz else sensor.ranging(self.mode).period_s)
+        return self.period_factor * (1.0 / self.rate_hz if self.rate_hz else sensor.timing[2])
 
 
 class RangeSample(NamedTuple):
@@ -113,7 +111,7 @@ class RangeFinders:
         flat_wall = (cones[:, :, 2] ** 3).sum(axis=1) / (cones[:, :, 2] ** 2).sum(axis=1)
         kinds = np.empty((count, 3))
         for k, (sensor, own) in enumerate(zip((unit.sensor for unit in skin.units), flaws, strict=True)):
-            farthest = sensor.farthest_m if own and own.seen_m else sensor.ranging(params.mode).distance_max_m
+            farthest = sensor.farthest_m if own and own.seen_m else sensor.grey_m
             kinds[k] = farthest, sensor.nearest_m, sensor.noise
         finders = Finders(
             data.xpos, data.xmat, bodies, skin.T_link_sensor, cones, np.column_stack([offset, flat_wall, kinds])
@@ -151,7 +149,7 @@ class RangeFinders:
 
     def change(self, params: RangeFinderParams) -> None:
         """Err in another way from the next measurement on; what was settled when they were mounted has to stay."""
-        for name in ("mode", "rings", "offset_max_m", "realistic"):
+        for name in ("rings", "offset_max_m", "realistic"):
             if getattr(params, name) != getattr(self.params, name):
                 raise ParameterError(
                     f"RangeFinderParams.{name} cannot change while the sensors run: create them again."
