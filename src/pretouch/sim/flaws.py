@@ -10,11 +10,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.random import Generator
 
 from pretouch.compiled import kernel
 from pretouch.sensing.sensor import VL53L1X, VL53L5CX, VL53L7CX, Sensor
 from pretouch.types import FloatArray, IntArray, RangeStatus
 
+Reading = tuple[float, int, float, float]
+"""Distance [m], status, standard deviation [m] and strength."""
 ByDistance = tuple[tuple[float, float], ...]
 """Pairs: a distance [m], and what is there or up to there."""
 
@@ -74,7 +77,7 @@ BLACK = 0.03
 (github.com/stm32duino/VL53L1X, issue 7)."""
 _STEPS, _END_M = 100.0, 4.0
 PART, NEXT, STAMP, ARRIVAL, _BLIND, _NEAREST = range(6)
-_OK, _SIGNAL = int(RangeStatus.OK), int(RangeStatus.SIGNAL)
+_OK, _SIGNAL, _MIN_RANGE = int(RangeStatus.OK), int(RangeStatus.SIGNAL), int(RangeStatus.MIN_RANGE)
 
 
 class FlawArrays(NamedTuple):
@@ -137,7 +140,7 @@ def _shares(pairs: ByDistance, d: FloatArray) -> FloatArray:
 
 
 @kernel
-def begin_frame(unit: int, kind: int, period: float, flaws: FlawArrays, rng: np.random.Generator) -> None:
+def begin_frame(unit: int, kind: int, period: float, flaws: FlawArrays, rng: Generator) -> None:
     """Let a burst of "no target" begin, or not, as near as the nearest target of the frame before was."""
     own, longest = flaws.course[unit], flaws.of_unit[unit, 3]
     cell = int(_STEPS * min(own[_NEAREST], _END_M))
@@ -149,12 +152,27 @@ def begin_frame(unit: int, kind: int, period: float, flaws: FlawArrays, rng: np.
 
 
 @kernel
-def flawed(k: int, distance: float, own: FloatArray, flaws: FlawArrays, rng: np.random.Generator) -> tuple[float, int]:
-    """Distance [m] and status that a sensor tells of a target that it sees at a distance [m], by its type's flaws."""
+def limits_of(k: int, farthest: float, flaws: FlawArrays, rng: Generator) -> tuple[float, float, float, float]:
+    """Return the noise at no distance [m], its growth, the distance of a grey target [m], and the least strength."""
+    floor, rate, softness = flaws.of_sensor[k, 0], flaws.of_sensor[k, 1], flaws.of_sensor[k, 3]
+    if softness == 0.0:
+        return floor, rate, farthest, 1.0
+    chance = rng.random()
+    return floor, rate, flaws.of_sensor[k, 2], (chance / (1.0 - chance)) ** softness
+
+
+@kernel
+def flawed(k: int, reading: Reading, reflectance: float, own: FloatArray, flaws: FlawArrays, rng: Generator) -> Reading:
+    """Return a reading of a sensor with the flaws of its type."""
+    distance, status, sigma, strength = reading
+    if reflectance <= BLACK and strength > 0.0:
+        return 0.022 + 0.005 * rng.random(), _OK, sigma, strength
+    if status != _OK and status != _MIN_RANGE:
+        return reading
     own[_NEAREST] = min(own[_NEAREST], distance)
     here = flaws.by_distance[flaws.kind[k], int(_STEPS * min(distance, _END_M))]
     blind = own[STAMP] < own[_BLIND] and not rng.random() < flaws.of_sensor[k, 5]
     if blind or rng.random() < here[1]:
-        return 0.0, _SIGNAL
+        return 0.0, _SIGNAL, 0.0, strength
     wrong = flaws.of_sensor[k, 4] * rng.random() if distance < flaws.of_sensor[k, 4] else 0.0
-    return distance + here[0] + wrong, _OK
+    return distance + here[0] + wrong, _OK, sigma, strength

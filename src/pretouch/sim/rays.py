@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from pretouch.compiled import compiled, entry, kernel
-from pretouch.sim.flaws import ARRIVAL, BLACK, NEXT, PART, PART_S, STAMP, FlawArrays, begin_frame, flawed
+from pretouch.sim.flaws import ARRIVAL, NEXT, PART, PART_S, STAMP, FlawArrays, begin_frame, flawed, limits_of
 from pretouch.sim.mujoco_calls import mj_rayHfield, mj_rayMesh, mju_rayGeom
 from pretouch.types import BoolArray, FloatArray, IntArray, RangeStatus
 
@@ -157,6 +157,7 @@ def measure(time: float, ranging: Ranging, rng: np.random.Generator) -> float:
     There has to be room for a row of each sensor.
     """
     p, due, rows, flaws = ranging.p, ranging.due, ranging.rows, ranging.flaws
+    finders, geoms = ranging.finders, ranging.geoms
     for unit in range(len(due)):
         if due[unit] > time:
             continue
@@ -183,7 +184,13 @@ def measure(time: float, ranging: Ranging, rng: np.random.Generator) -> float:
                 rows[0] += 1
                 row[0], row[1], row[7] = k, own[STAMP], draws[k - first]
                 row[2] = np.inf if ranging.silent[k] else own[ARRIVAL]
-                row[3], row[4], row[5], row[6] = _measured(k, row[7], ranging, own, rng)
+                limits = p.noise_floor_m, p.noise_rate, finders.figures[k, 2], 1.0
+                if flaws.kind[k] >= 0:
+                    limits = limits_of(k, limits[2], flaws, rng)
+                reading = _measured(k, row[7], limits, p, finders, geoms)
+                if flaws.kind[k] >= 0:
+                    reading = flawed(k, reading, p.reflectance, own, flaws, rng)
+                row[3], row[4], row[5], row[6] = reading
     return due.min() if len(due) else np.inf
 
 
@@ -206,26 +213,23 @@ def deliver(
 
 @kernel
 def _measured(
-    k: int, draw: float, ranging: Ranging, own: FloatArray, rng: np.random.Generator
+    k: int, draw: float, limits: tuple[float, float, float, float], p: Any, finders: Finders, geoms: Geoms
 ) -> tuple[float, int, float, float]:
     """Measure with a sensor; `draw` is normal. Return distance [m], status, standard deviation [m], and strength.
+
+    The limits are the noise at no distance [m], its growth, the distance of a grey target that is just seen [m], and
+    the least strength that is.
 
     The nearest group of returns strong enough to be detected is reported. Strength falls with the square of the
     distance and the cosine of incidence. It is relative to a target that is just detected: one that fills the cone, at
     `distance_max`, square to the beam, of `reflectance_limit`, has 1 in all.
     """
-    p, finders, flaws = ranging.p, ranging.finders, ranging.flaws
+    floor, rate, grey, least = limits
     link, figures = finders.link[k], finders.figures[k]
     offset, calibration, distance_max, nearest_m, noise = figures[0], figures[1], figures[2], figures[3], figures[4]
-    floor, rate, grey, least = p.noise_floor_m, p.noise_rate, distance_max, 1.0
-    if flaws.kind[k] >= 0:
-        floor, rate, softness = flaws.of_sensor[k, 0], flaws.of_sensor[k, 1], flaws.of_sensor[k, 3]
-        if softness > 0.0:
-            chance = rng.random()
-            grey, least = flaws.of_sensor[k, 2], (chance / (1.0 - chance)) ** softness
     origin, R = placed(finders.position[link], finders.rotation[link], finders.T_link_sensor[k])
     rays = turned(R, finders.cone[k])
-    distance, normal, _ = cast(origin, rays, ranging.geoms, link, distance_max)
+    distance, normal, _ = cast(origin, rays, geoms, link, distance_max)
     brightness, count = p.reflectance / p.reflectance_limit, len(distance)
     strength = np.zeros(count)
     for i in range(count):
@@ -240,8 +244,6 @@ def _measured(
             ratio = grey / max(distance[i], 0.01)  # 10 mm: no return is infinitely strong
             strength[i] = brightness * slant * ratio * ratio / count
     total, mean = _nearest_group(distance, strength, p.merge_m, least)
-    if flaws.kind[k] >= 0 and p.reflectance <= BLACK and sum(strength) > 0.0:
-        return 0.022 + 0.005 * rng.random(), _OK, floor, sum(strength)
     if total == 0.0:
         return 0.0, _SIGNAL, 0.0, sum(strength)
     mean *= calibration / total
@@ -253,9 +255,6 @@ def _measured(
     measured = max(0.0, mean + offset + sigma * draw)
     if not trusted:
         return measured, _SIGMA, sigma, total
-    if flaws.kind[k] >= 0:
-        measured, status = flawed(k, measured, own, flaws, rng)
-        return measured, status, sigma if status == _OK else 0.0, total
     return measured, _MIN_RANGE if measured < nearest_m else _OK, sigma, total
 
 
