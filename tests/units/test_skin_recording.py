@@ -78,15 +78,6 @@ def test_every_field_of_every_sample_comes_back(place):
             assert (received.offset, received.bound) == (90.0, 1e-4)
 
 
-def test_ranges_come_back_as_arrays(place):
-    unit = read_skin(place).units["wrist"]
-    fresh = [n for n in range(1, 101) if n % 4]
-    assert np.allclose(unit.range.distance, [0.5 + n / 1000 for n in fresh], atol=1e-12)
-    assert np.array_equal(unit.range.stamp, [stamp(n) for n in fresh], equal_nan=True)
-    assert np.array_equal(unit.range.status, [0 if n % 7 else 4 for n in fresh])
-    assert np.allclose(unit.range.sigma, 0.003)
-
-
 def read_back(place, received, *joints) -> SkinTrace:
     """Record samples of a unit, and states of joints in parts: (stamp, q, qd, names)."""
     with SkinRecording(place) as recording:

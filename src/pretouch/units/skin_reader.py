@@ -16,26 +16,7 @@ from pretouch.sensing.unit import LARGEST_COUNT, counts_of
 from pretouch.traces import ImuTrace, JointTrace
 from pretouch.types import FloatArray, IntArray
 from pretouch.units.unit import Received
-from pretouch.units.wire import SAMPLE_LEAST, TAG_SIZE, Flag, imu_values, sample_of
-from pretouch.values import value
-
-
-@value
-class RangeTrace:
-    """Readings of one unit, in the order in which they came. R of them."""
-
-    stamp: FloatArray
-    """(R,) earliest instant of the measurement [s], NaN while the unit's clock was not known."""
-    bound: FloatArray
-    """(R,) most the unit's clock can have been off by [s]."""
-    arrival: FloatArray
-    """(R,) when the datagram came [s]."""
-    distance: FloatArray
-    """(R,) [m]."""
-    status: IntArray
-    """(R,) `RangeStatus` codes."""
-    sigma: FloatArray
-    """(R,) standard deviation by the sensor's own estimate [m]."""
+from pretouch.units.wire import SAMPLE_LEAST, TAG_SIZE, imu_values, sample_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +25,6 @@ class UnitTrace:
 
     samples: list[Received]
     """Its datagrams, in the order in which they came; `unit` is the index of the unit in the recording."""
-    range: RangeTrace
     imu: ImuTrace
     """Samples in the order of the datagrams; unknown stamps are NaN, see `calibration.stamps.instants`."""
     acceleration_max: float
@@ -110,7 +90,7 @@ def unit_trace(samples: list[Received]) -> UnitTrace:
     scales = [counts_of(one.sample.imu_scale) for one in used]
     full = [LARGEST_COUNT * min(lsb) for lsb in zip(*scales, strict=True)] or [np.inf, np.inf]
     values = (np.concatenate([np.zeros((0, 3)), *(batch[k] for batch in batches)]) for k in (1, 2))
-    return UnitTrace(samples, _ranges(samples), ImuTrace(stamp, *values), *full)
+    return UnitTrace(samples, ImuTrace(stamp, *values), *full)
 
 
 def _column(samples: list[Received], name: str) -> IntArray:
@@ -119,13 +99,6 @@ def _column(samples: list[Received], name: str) -> IntArray:
 
 def _times(samples: list[Received], name: str) -> FloatArray:
     return np.array([getattr(one, name) for one in samples], dtype=np.float64)
-
-
-def _ranges(samples: list[Received]) -> RangeTrace:
-    fresh = [one for one in samples if one.sample.flags & Flag.RANGE_NEW]
-    stamp, bound, arrival = (_times(fresh, name) for name in ("stamp", "bound", "arrival"))
-    distance, status, sigma = (_column(fresh, f"range_{name}") for name in ("mm", "status", "sigma"))
-    return RangeTrace(stamp, bound, arrival, distance / 1000, status, sigma / 4000)
 
 
 def _joints(place: Path, states: list[Any]) -> tuple[JointTrace | None, tuple[str, ...]]:
