@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pretouch import cli
+from pretouch.calibration.calibrate import BOARD_MISALIGNMENT_DEG
 from pretouch.cli.calibrate import recorded as recording_way
 from pretouch.sensing.skin import Skin, load_skin, save_skin
 from pretouch.traces import JointTrace
@@ -68,8 +69,8 @@ def test_a_recording_of_units_and_joints_becomes_a_skin_file(panda_model, skin, 
         assert unit["accepted"]
         np.testing.assert_allclose(place["T_link_sensor"], written.T_link_sensor, atol=1e-9)
         assert place["position_sigma"] == pytest.approx(written.position_sigma)
-        floor = told["orientation_floor"]
-        assert written.orientation_sigma == pytest.approx(np.hypot(place["orientation_sigma"], floor))
+        askew = np.deg2rad(BOARD_MISALIGNMENT_DEG)
+        assert written.orientation_sigma == pytest.approx(np.hypot(place["orientation_sigma"], askew))
         assert np.array(place["covariance"]).shape == (6, 6)
         assert unit["id"] in said
 

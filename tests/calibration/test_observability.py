@@ -6,8 +6,8 @@ import pytest
 from pretouch.calibration.calibrate import calibrate
 from pretouch.calibration.findings import Axis, unknown_directions
 from pretouch.calibration.identify import Identifier
-from pretouch.calibration.joint_noise import JointNoise
 from pretouch.calibration.link_motion import ArmMotion
+from pretouch.calibration.locate import JointNoise
 from pretouch.calibration.signals import rate_of_change, smooth, times
 from pretouch.sensing.skin import Skin
 from pretouch.sim.random_skin import random_skin

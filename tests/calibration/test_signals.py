@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from pretouch.calibration.alignment import align
+from pretouch.calibration.identify import align
 from pretouch.calibration.signals import ImuSignal, rate_of_change, saturated, smooth, times
 from pretouch.calibration.values import UnitData
 from pretouch.traces import ImuTrace

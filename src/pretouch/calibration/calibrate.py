@@ -16,9 +16,8 @@ from pretouch.calibration.findings import (
 )
 from pretouch.calibration.fit import ACC_BIAS, ACC_SCALE, GYRO_BIAS, GYRO_SCALE
 from pretouch.calibration.identify import Identified, Identifier
-from pretouch.calibration.joint_noise import JointNoise
 from pretouch.calibration.link_motion import ArmMotion
-from pretouch.calibration.locate import Located
+from pretouch.calibration.locate import JointNoise, Located
 from pretouch.calibration.values import Calibration, CalibrationData, Place, Remark, UnitCalibration, UnitData
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
@@ -38,19 +37,14 @@ def calibrate(model: RobotModel, data: CalibrationData) -> Calibration:
         CalibrationError: nothing can be made from the joints' data, or two units have the same id.
         RobotModelError: the arm has no link that a unit is said to sit on.
     """
-    _check_ids(data.units)
+    ids = [unit.id for unit in data.units]
+    if twice := sorted({i for i in ids if ids.count(i) > 1}):
+        raise CalibrationError(f"The unit id {', '.join(twice)} is used more than once: give each unit its own id.")
     joints, notes = checked_joints(model, data.joints)
     arm = ArmMotion(model, joints)
     identifier, noise = Identifier(arm), JointNoise(arm, joints)
     units = tuple(_calibrated(identifier, noise, unit) for unit in data.units)
-    return Calibration(units, notes, float(np.deg2rad(BOARD_MISALIGNMENT_DEG)))
-
-
-def _check_ids(units: tuple[UnitData, ...]) -> None:
-    ids = [unit.id for unit in units]
-    twice = sorted({i for i in ids if ids.count(i) > 1})
-    if twice:
-        raise CalibrationError(f"The unit id {', '.join(twice)} is used more than once: give each unit its own id.")
+    return Calibration(units, notes)
 
 
 def _calibrated(identifier: Identifier, noise: JointNoise, unit: UnitData) -> UnitCalibration:
@@ -112,12 +106,12 @@ def skin_of(calibration: Calibration, model: RobotModel, keep: Skin | None = Non
         raise CalibrationError("No unit was located reliably, so no skin can be made: see the findings of each unit.")
     for unit in calibration.units:
         if unit.place and unit.accepted:
-            new, old = _sensor_unit(unit.id, unit.place, model, calibration.orientation_floor), units.get(unit.id)
+            new, old = _sensor_unit(unit.id, unit.place, model), units.get(unit.id)
             units[unit.id] = replace(new, touch=old.touch, sensor=old.sensor) if old else new
     return Skin(tuple(units.values()), model)
 
 
-def _sensor_unit(name: str, place: Place, model: RobotModel, orientation_floor: float) -> SensorUnit:
+def _sensor_unit(name: str, place: Place, model: RobotModel) -> SensorUnit:
     """Return a unit of a skin; one that lies inside its link's capsules is moved out, as its findings say.
 
     Its orientation's standard deviation is about each axis: of the fit's worst one, and how well the board is glued on.
@@ -127,5 +121,5 @@ def _sensor_unit(name: str, place: Place, model: RobotModel, orientation_floor: 
     if outside is not None:
         sigma = float(np.hypot(sigma, np.linalg.norm(outside - T[:3, 3])))
         T[:3, 3] = outside
-    turned = min(float(np.hypot(place.orientation_sigma, orientation_floor)), LARGEST_ORIENTATION_SIGMA)
-    return SensorUnit(name, place.link, T, min(sigma, LARGEST_POSITION_SIGMA), turned)
+    turned = float(np.hypot(place.orientation_sigma, np.deg2rad(BOARD_MISALIGNMENT_DEG)))
+    return SensorUnit(name, place.link, T, min(sigma, LARGEST_POSITION_SIGMA), min(turned, LARGEST_ORIENTATION_SIGMA))

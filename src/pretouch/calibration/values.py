@@ -128,6 +128,3 @@ class Calibration:
     """Results in the order of the data."""
     findings: tuple[Remark, ...] = ()
     """Findings on the joints' data."""
-    orientation_floor: float = 0.0
-    """Standard deviation, about each axis, of the angle between an IMU's axes and its range finder's [rad]; no IMU can
-    tell it."""
