@@ -1,7 +1,7 @@
 """`pretouch robot import` and `check`: the report on an arm's file, capsules and assumptions."""
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from pretouch.cli.tables import show
 from pretouch.cli.writing import numbers_to
 from pretouch.errors import RobotModelError
 from pretouch.importing.capsules import LinkBody
-from pretouch.importing.read import described, read_robot
+from pretouch.importing.read import read_robot
 from pretouch.importing.ready import Ready, check_posture, never_apart, rated
 from pretouch.importing.robot_import import ImportOptions, check_free, import_robot, write_folder
 from pretouch.robot.description import FILE, load_description
@@ -32,9 +32,8 @@ class ImportArm(ImportOptions):
     Look at what is printed: all that the file does not say is assumed, with a sentence for each.
     """
 
-    file: tyro.conf.Positional[str]
-    """URDF file (not a xacro template) or MJCF file, or a name of the package robot_descriptions, if it is installed,
-    such as ur5e_mj_description."""
+    file: tyro.conf.Positional[Path]
+    """URDF file (not a xacro template) or MJCF file."""
     out: OptionalFile = None
     """Folder to write robot.toml and arm.xml to; by default the arm's name."""
     package_path: Paths = ()
@@ -52,16 +51,13 @@ class ImportArm(ImportOptions):
 
     def run(self) -> None:
         """Import an arm, print a report, and write its folder."""
-        file, options, folder = Path(self.file), self, self.out
-        if named := described(self.file):
-            file, package = named
-            options = replace(self, package_path=(*self.package_path, package))
+        folder = self.out
         if not folder:  # of the arm's name: letters, digits, dashes and dots only
-            name = self.name or read_robot(file, options.package_path).name
+            name = self.name or read_robot(self.file, self.package_path).name
             folder = Path(re.sub(r"[^A-Za-z0-9_.-]+", "-", name).strip("-.")[:60] or "arm")
         check_free(folder)
         with numbers_to(self.json) as write:
-            write(_imported(file, options, folder))
+            write(_imported(self.file, self, folder))
 
 
 def _imported(file: Path, options: ImportOptions, folder: Path) -> dict[str, Any]:

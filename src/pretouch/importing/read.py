@@ -1,10 +1,8 @@
 """Reading of a robot's URDF or MJCF file by MuJoCo, of what MuJoCo does not take of a URDF, and of mesh files."""
 
-import re
 import warnings
 from contextlib import suppress
 from functools import partial
-from importlib import import_module
 from io import BytesIO
 from pathlib import Path
 from urllib.parse import unquote
@@ -33,30 +31,7 @@ _LARGEST_M = 5.0
 """Length of an origin beyond which it is taken for one in millimetres [m]."""
 _NARROW = 0.1
 """Ranges of all joints below which they are taken for degrees, taken for radians, taken for degrees [rad]."""
-_PACKAGE = "robot_descriptions"
 _MESHES = (".stl", ".obj", ".dae")
-
-
-def described(name: str) -> tuple[Path, Path] | None:
-    """Return the URDF or MJCF file of a robot by its name, as ur5_description, and the folder with its ROS package.
-
-    None for other names, and those of files. The package robot_descriptions of PyPI fetches each robot by git. Where
-    it is not installed, does not know the name, or cannot fetch the files, a RobotModelError says so.
-    """
-    if Path(name).exists() or not re.fullmatch("[a-z][a-z0-9_]*_description", name):
-        return None
-    try:
-        module = import_module(f"{_PACKAGE}.{name}")
-        file = Path(getattr(module, "URDF_PATH", None) or module.MJCF_PATH)
-        package = Path(getattr(module, "PACKAGE_PATH", None) or file.parent)
-    except Exception as error:  # whatever git, its cache or a macro processor have to say
-        reason = " ".join(str(error).split())[:300] or type(error).__name__
-        raise RobotModelError(
-            f"There is no file {name}, and the package {_PACKAGE} could not bring it: {reason}. Give a URDF or MJCF"
-            f" file; or run pip install {_PACKAGE}, which fetches each robot that it knows once, by git from the"
-            " Internet."
-        ) from error
-    return file, package.parent
 
 
 def read_robot(file: Path, folders: tuple[Path, ...] = ()) -> RobotTree:
