@@ -36,7 +36,7 @@ def test_an_arm_is_imported_checked_and_reported(tmp_path, capsys):
     told = tmp_path, "--ready", READY, "--json", str(numbers)
     assert imported(*told) == 0
     printed = capsys.readouterr().out
-    for part in ("sixer: 6 joints, end-effector tool0", "stand over", "sticks out", "manipulability", "Written: "):
+    for part in ("sixer: 6 joints, end-effector tool0", "stand over", "sticks out", "singular value", "Written: "):
         assert part in printed
     assert "of its capsules most, by" in printed
     assert "raise approach.d_repulse_m by as much, or import with --cover" in printed

@@ -164,6 +164,6 @@ def joint_table(model: RobotModel, ready: Ready, note: str) -> TextTable:
 def ready_said(ready: Ready) -> str:
     """Return a sentence on the quality of a posture."""
     return (
-        f"Ready posture: manipulability {ready.manipulability:.3g}, smallest singular value {ready.singular_value:.3g},"
-        f" {1000 * ready.clear:.0f} mm clear of itself."
+        f"Ready posture: smallest singular value {ready.singular_value:.3g}, {1000 * ready.clear:.0f} mm clear of"
+        " itself."
     )

@@ -29,8 +29,6 @@ _COMPILER = {
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _LARGEST_M = 5.0
 """Length of an origin beyond which it is taken for one in millimetres [m]."""
-_NARROW = 0.1
-"""Ranges of all joints below which they are taken for degrees, taken for radians, taken for degrees [rad]."""
 _MESHES = (".stl", ".obj", ".dae")
 
 
@@ -77,17 +75,11 @@ def _root(file: Path) -> ET.Element:
 
 
 def _note_left_out(model: mujoco.MjModel, remarks: list[str]) -> None:
-    """Say what an arm will be without, and which ranges are odd."""
+    """Say what an arm will be without."""
     if model.neq:
         remarks.append(f"{model.neq} couplings, of joints that mimic others or of bodies, are left out.")
     if others := int((~np.isin(model.geom_type, SOLIDS) & (model.geom_bodyid > 0)).sum()):
         remarks.append(f"{others} shapes that are planes, height fields or the like are left out.")
-    limited = model.jnt_range[model.jnt_limited.astype(bool)]
-    if len(limited) and np.ptp(limited, axis=1).max() < _NARROW:
-        remarks.append(
-            f"All joints have ranges below {_NARROW:g} rad: if they are radians in the file, its <compiler> needs"
-            ' angle="radian".'
-        )
 
 
 def _urdf(root: ET.Element, beside: Beside, file: Path, folders: tuple[Path, ...]) -> mujoco.MjSpec:
@@ -158,11 +150,9 @@ def _prepare_joint(joint: ET.Element, beside: Beside) -> None:
     """Note what MuJoCo does not take of a joint, take out bounds that are none, and look for other units."""
     origin, limit, name = joint.find("origin"), joint.find("limit"), joint.get("name", "")
     if origin is not None:
-        xyz, rpy = (origin.get(key, "0 0 0") for key in ("xyz", "rpy"))
+        xyz = origin.get("xyz", "0 0 0")
         if max(abs(float(word)) for word in xyz.split()) > _LARGEST_M:
             raise RobotModelError(f"{name}: xyz of <origin> is {xyz!r}: give metres; these seem to be millimetres.")
-        if max(abs(float(word)) for word in rpy.split()) > 2 * np.pi + 0.01:
-            beside.remarks.append(f"The rpy of {name} is beyond a turn, perhaps degrees in place of radians: {rpy}.")
     if limit is None:
         return
     low, high, speed = (float(limit.get(key, 0.0)) for key in ("lower", "upper", "velocity"))

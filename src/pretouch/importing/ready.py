@@ -38,8 +38,6 @@ class Ready:
 
     q: FloatArray
     """(n,) [rad]."""
-    manipulability: float
-    """Yoshikawa's, sqrt(det(J J^T)) of the hand's position and orientation; of a Panda's usual posture about 0.08."""
     singular_value: float
     """Smallest singular value of the Jacobian [m or 1 per rad]; 0 is singular."""
     clear: float
@@ -86,7 +84,7 @@ def rated(model: RobotModel, q: FloatArray, apart: BoolArray | None = None) -> R
         at = int(between.argmin())
         first, second = (model.links[model.capsules.link[c]] for c in model.apart[apart][at])
         clear, nearest = float(between[at]), (first, second)
-    return Ready(q, float(np.prod(values)) if model.n >= 6 else 0.0, float(values[-1]), clear, nearest)
+    return Ready(q, float(values[-1]), clear, nearest)
 
 
 def proposed(model: RobotModel, remarks: list[str]) -> Ready:
