@@ -69,7 +69,7 @@ def at_begin(monkeypatch, seconds, then):
         (("--seed", "-1"), "--seed is -1"),
         (("--units-host", ""), "--units-host is empty"),
         (("--path", "circle", "--radius", "3"), "cannot reach"),
-        (("--no-learnt", "--learn-anew"), "--no-learnt does not go with"),
+        (("--no-learnt", "--learnt", "a.toml"), "--no-learnt does not go with"),
         (("--arm", "ur5"), "There is no arm 'ur5'"),
     ],
 )
@@ -175,7 +175,7 @@ LEARNING = (
 @pytest.mark.slow
 def test_a_second_run_begins_with_what_the_first_learnt_and_can_be_recomputed(tmp_path, capsys):
     place = tmp_path / "state" / "pretouch" / "free-motion" / "simulated-panda-seed-0.toml"
-    known = "Free motion of this robot is known since"
+    known = "Free motion of this robot is known (2 s"
     for name, told in (("a", "This robot's free motion is not known yet"), ("b", known)):
         assert cli.main([*LEARNING, "--seconds", "2", "--record", f"{name}.mcap"]) == 0
         said = capsys.readouterr().out

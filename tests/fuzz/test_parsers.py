@@ -148,7 +148,7 @@ def _of_tables(folder: Path, model: RobotModel) -> dict[str, Parser]:
 def _of_tomls(folder: Path, model: RobotModel) -> dict[str, Parser]:
     save_keys(KEYS, folder / "keys.toml")
     read_learnt = partial(load_learnt, arm=model, p=SequentialParams())
-    save_learnt(folder / "learnt.toml", model, residual_init(model.n, SequentialParams()), "panda", 0.0, 1.0)
+    save_learnt(folder / "learnt.toml", model, residual_init(model.n, SequentialParams()), "panda", 1.0)
 
     def keys(place: Path) -> object:
         place.chmod(0o600)

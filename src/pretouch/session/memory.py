@@ -114,23 +114,21 @@ class _StoredMotion(msgspec.Struct):
     joints: list[str]
     robot: str
     """Robot that the model was learnt on, as `panda at 172.16.0.2`."""
-    since: float
-    """Start of learning [s since 1970, UTC]."""
     saved: float
     """Time of writing [s since 1970, UTC]."""
     array: dict[str, _StoredArray]
 
 
-def save_learnt(path: Path, arm: RobotModel, learnt: ResidualModel, robot: str, since: float, saved: float) -> None:
+def save_learnt(path: Path, arm: RobotModel, learnt: ResidualModel, robot: str, saved: float) -> None:
     """Write a file of free motion; one that is there is replaced whole or, with an OSError, not at all."""
     arrays = {name: getattr(learnt, name) for name in _LASTING}
     stored = {name: _StoredArray(list(a.shape), a.reshape(-1).tolist()) for name, a in arrays.items()}
-    file = _StoredMotion(_FORMAT, arm.description.name, list(arm.joints), robot, since, saved, stored)
+    file = _StoredMotion(_FORMAT, arm.description.name, list(arm.joints), robot, saved, stored)
     atomic_write(path, tomli_w.dumps(msgspec.to_builtins(file)))
 
 
-def load_learnt(path: Path, arm: RobotModel, p: SequentialParams) -> tuple[ResidualModel, str, float, float]:
-    """Read a file of free motion: the model, robot, since and saved; one that cannot be used is a RobotModelError."""
+def load_learnt(path: Path, arm: RobotModel, p: SequentialParams) -> tuple[ResidualModel, str, float]:
+    """Read a file of free motion: model, robot, instant of saving; one that cannot be used is a RobotModelError."""
     try:
         stored = msgspec.convert(parse_toml(path.read_bytes()), _StoredMotion)
     except OSError as error:
@@ -140,8 +138,8 @@ def load_learnt(path: Path, arm: RobotModel, p: SequentialParams) -> tuple[Resid
     for key, ours in (("format", _FORMAT), ("arm", arm.description.name), ("joints", list(arm.joints))):
         if getattr(stored, key) != ours:
             raise RobotModelError(f"{path} has {key} = {getattr(stored, key)!r}, but {ours!r} is needed: {_ANEW}.")
-    if not (0.0 <= stored.since < _LATEST and 0.0 <= stored.saved < _LATEST):
-        raise RobotModelError(f"{path} has no possible start time: {_ANEW}.")
+    if not 0.0 <= stored.saved < _LATEST:
+        raise RobotModelError(f"{path} was saved at the impossible time {stored.saved:g} s: {_ANEW}.")
     fresh, arrays = residual_init(arm.n, p), list[FloatArray]()
     for name in _LASTING:
         shape, array = getattr(fresh, name).shape, stored.array.get(name)
@@ -154,7 +152,7 @@ def load_learnt(path: Path, arm: RobotModel, p: SequentialParams) -> tuple[Resid
         check_learnt(learnt, arm)
     except ParameterError as error:
         raise RobotModelError(f"{path}: {error}") from error
-    return learnt, stored.robot, stored.since, stored.saved
+    return learnt, stored.robot, stored.saved
 
 
 def check_learnt(learnt: ResidualModel, arm: RobotModel) -> None:
@@ -228,15 +226,12 @@ class FreeMotion:
     sentence = "This robot's free motion is not known yet: at first only firm pushes are detected."
     """Sentence on the model that was loaded."""
 
-    def __init__(
-        self, file: ModelFile, controller: Controller, relearn: bool = False, now: Callable[[], float] = time.time
-    ) -> None:
+    def __init__(self, file: ModelFile, controller: Controller, now: Callable[[], float] = time.time) -> None:
         """Read the robot's model. A file that a person named and that cannot be used is a RobotModelError.
 
         Args:
             file: the file, which may be missing.
             controller: that moves the arm, with the sequential detector.
-            relearn: whether to begin with nothing whatever the file holds.
             now: gives the time [s since 1970].
         """
         self._file, self._model, self._now = file, controller.model, now
@@ -244,13 +239,10 @@ class FreeMotion:
         if not isinstance(detector, SequentialTest):
             raise ParameterError(f"The profile {controller.profile.name} learns no free motion.")
         self._params, self._period = detector, controller.limits.period
-        self._since, self._unusable = now(), False
+        self._unusable = False
         self._newest: ResidualModel | None = None
         if os.path.exists(file.path):
-            self._load()  # also where it begins anew: a file of another kind is not to be written over
-        if relearn:
-            self.begin, self._since = None, now()
-            self.sentence = "This robot's free motion is learnt again from the beginning."
+            self._load()
 
     def record(self, cycle: Cycle) -> None:
         """Remember the model after one turn of the loop."""
@@ -266,7 +258,7 @@ class FreeMotion:
             path.parent.mkdir(parents=True, exist_ok=True)
             if self._unusable:
                 os.replace(path, _aside(path))
-            save_learnt(path, self._model, model, self._file.robot, self._since, self._now())
+            save_learnt(path, self._model, model, self._file.robot, self._now())
         except OSError as error:
             return (
                 f"The free motion learnt in this run could not be saved. {path}: {error.strerror}. The previous file is"
@@ -277,7 +269,7 @@ class FreeMotion:
     def _load(self) -> None:
         file = self._file
         try:
-            learnt, robot, since, saved = load_learnt(file.path, self._model, self._params)
+            learnt, robot, saved = load_learnt(file.path, self._model, self._params)
             if robot != file.robot and not file.named:
                 raise RobotModelError(f"The file {file.path} belongs to {robot}, but this robot is {file.robot}.")
         except RobotModelError as error:
@@ -291,10 +283,9 @@ class FreeMotion:
             return
         pause = self._now() - saved
         self.begin = rested(learnt, pause if pause >= 0.0 else np.inf, self._params)
-        self._since = since
         self.sentence = (
-            f"Free motion of {'this robot' if robot == file.robot else robot} is known since {_date(since)}"
-            f" ({self._amount(learnt)}, last saved {_date(saved)}): {file.path}"
+            f"Free motion of {'this robot' if robot == file.robot else robot} is known ({self._amount(learnt)}, saved"
+            f" {datetime.fromtimestamp(saved, UTC):%Y-%m-%d %H:%M} UTC): {file.path}"
         )
 
     def _amount(self, model: ResidualModel) -> str:
@@ -304,7 +295,3 @@ class FreeMotion:
 
 def _aside(path: Path) -> Path:
     return path.with_name(path.name + _UNUSABLE)
-
-
-def _date(instant: float) -> str:
-    return f"{datetime.fromtimestamp(instant, UTC):%Y-%m-%d %H:%M} UTC"

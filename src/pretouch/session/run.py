@@ -1,10 +1,11 @@
 """Motion of the arm: slowly to the start of its path, then under the controller. Each end tries to bring it to rest."""
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -126,20 +127,41 @@ def announcement(controller: Controller, seconds: float, way: Plan | None, asks:
 
 
 class RunFiles:
-    """Files of a run: a recording, if requested, and the last seconds before each HOLD that latches."""
+    """Files of a run: a recording, if requested, and the last seconds before HOLDs that latch; a context manager."""
 
     def __init__(
         self,
-        recording: Recording | None,
-        last_seconds: LastSeconds,
+        standing: StandingArm,
+        place: Path | None,
+        folder: Path,
         tell: Callable[[str], None],
-        learnt: FreeMotion | None,
-        further: Recorder | None,
+        learnt: FreeMotion | None = None,
+        further: Recorder | None = None,
     ) -> None:
-        """Take the files, and the others as `open_run_files`."""
-        self._recording, self._last_seconds, self._tell, self._learnt = recording, last_seconds, tell, learnt
-        self._recorders: list[Recorder] = [one for one in (last_seconds, learnt, further) if one]
+        """Open the files.
+
+        Args:
+            standing: the arm that is going to move.
+            place: recording to write, if any.
+            folder: for the last seconds before each HOLD that latches.
+            tell: is called at once, without waiting, when the recording fails.
+            learnt: what remembers free motion, if anything does.
+            further: what else is given each cycle, if anything.
+        """
+        controller, about = standing.controller, {"robot": standing.arm.name}
+        with ExitStack() as stack:
+            self._recording = stack.enter_context(Recording(place, controller, about)) if place else None
+            self._last_seconds = stack.enter_context(LastSeconds(controller, folder, self._recording, about=about))
+            self._opened = stack.pop_all()
+        self._tell, self._learnt = tell, learnt
+        self._recorders: list[Recorder] = [one for one in (self._last_seconds, learnt, further) if one]
         self._notified = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._opened.close()
 
     def record(self, cycle: Cycle) -> None:
         """Keep one turn of the loop; that the recording fails is said once."""
@@ -161,32 +183,6 @@ class RunFiles:
         sentences += [f"The last seconds before a HOLD: {place}" for place in last.written]
         sentences += [last.trouble] if last.trouble else []
         return (*sentences, self._recording.close()) if self._recording else tuple(sentences)
-
-
-@contextmanager
-def open_run_files(
-    standing: StandingArm,
-    place: Path | None,
-    folder: Path,
-    tell: Callable[[str], None],
-    learnt: FreeMotion | None = None,
-    further: Recorder | None = None,
-) -> Iterator[RunFiles]:
-    """Open the files of a run.
-
-    Args:
-        standing: the arm that is going to move.
-        place: recording to write, if any.
-        folder: for the last seconds before each HOLD that latches.
-        tell: is called at once, without waiting, when the recording fails.
-        learnt: what remembers free motion, if anything does.
-        further: what else is given each cycle, if anything.
-    """
-    controller, about = standing.controller, {"robot": standing.arm.name}
-    with ExitStack() as stack:
-        recording = stack.enter_context(Recording(place, controller, about)) if place else None
-        last = stack.enter_context(LastSeconds(controller, folder, recording, about=about))
-        yield RunFiles(recording, last, tell, learnt, further)
 
 
 def execute(

@@ -7,10 +7,10 @@ import numpy as np
 
 from pretouch import desired
 from pretouch.calibration.motion.plan import Plan
-from pretouch.control.path import segment
+from pretouch.control.path import Path, segment
 from pretouch.controller import Controller
 from pretouch.desired import Desired
-from pretouch.perception.scene_filter import Fixtures, no_fixtures
+from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES, Profile, at_rate
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
@@ -36,21 +36,23 @@ _SHORTEST_M = 1e-5
 """A path must have a length: over so little an arm stands."""
 
 
-def plan_controller(
-    model: RobotModel, q: FloatArray, like: Profile | None = None, fixtures: Fixtures | None = None
-) -> Controller:
+def plan_controller(model: RobotModel, q: FloatArray, like: Profile | None = None) -> Controller:
     """Return the controller, without a skin, of an arm that stands at q (n,) [rad] and is to follow a plan.
 
-    `like` is a profile whose rate and patience with failures count (None: `blind`), `fixtures` the static objects
-    around the arm, of which a controller without a skin sees nothing.
+    `like` is a profile whose rate and patience with failures count (None: `blind`).
     """
     profile = PROFILES["blind"]
     profile = replace(profile, task=replace(profile.task, position_gain_1_s=_GAIN_1_S))
     if like is not None:
         profile = replace(at_rate(profile, 1.0 / like.task.control_period_s), failure=like.failure)
-    x, y, z = model.kinematics(q).position[model.ee].tolist()
-    stands = segment((x, y, z), (x, y, z + _SHORTEST_M))
-    return Controller(model, Skin((), model), no_fixtures() if fixtures is None else fixtures, stands, profile)
+    stands = standing_at(model.kinematics(q).position[model.ee])
+    return Controller(model, Skin((), model), no_fixtures(), stands, profile)
+
+
+def standing_at(point: FloatArray) -> Path:
+    """Return the path of an arm that keeps its end-effector at a point (3,) [m], base frame."""
+    x, y, z = point.tolist()
+    return segment((x, y, z), (x, y, z + _SHORTEST_M))
 
 
 class PlanCommander:

@@ -23,7 +23,7 @@ from pretouch.session.may_move import StandingArm, Standstill, refusals, vector
 from pretouch.session.memory import ConfirmedRobots, FreeMotion, state_folder
 from pretouch.session.progress import ProgressReporter
 from pretouch.session.push import Direction, GuidedPush
-from pretouch.session.run import Ending, announcement, execute, open_run_files, plan_to_start
+from pretouch.session.run import Ending, RunFiles, announcement, execute, plan_to_start
 from pretouch.session.terminal import BackgroundPrinter, EnterKey, require_yes, say
 from pretouch.signals import noted_in_motion
 
@@ -79,8 +79,8 @@ def check_options(command: Run[Any]) -> None:
         raise HardwareError("--no-skin does not go with --skin and --keys: leave one or the other out.")
     if not (units.no_skin or units.keys or arm.brings_units):
         raise HardwareError("The arm brings no sensor units: give the file of their keys with --keys, or --no-skin.")
-    if robot.no_learnt and (robot.learnt or robot.learn_anew):
-        raise RobotError("--no-learnt does not go with --learnt and --learn-anew: leave one or the other out.")
+    if robot.no_learnt and robot.learnt:
+        raise RobotError("--no-learnt does not go with --learnt: leave one or the other out.")
     if not 0.0 <= command.task.seconds < float("inf"):
         raise ParameterError(f"--seconds is {command.task.seconds:g}: give 0 or more.")
 
@@ -202,7 +202,7 @@ def _executed(
     with ExitStack() as stack:
         tell = stack.enter_context(BackgroundPrinter(say))
         output = stack.enter_context(opened.output(controller))
-        opening = open_run_files(standing, command.record, Path(command.holds), tell, learnt, output)
+        opening = RunFiles(standing, command.record, Path(command.holds), tell, learnt, output)
         files = stack.enter_context(opening)
         reporter = ProgressReporter(files, tell, latched, controller)
         options = RealTimeOptions(

@@ -23,8 +23,6 @@ class RobotOptions:
     """Ask for the guided pushes even if the force sign of this robot is confirmed."""
     learnt: OptionalFile = None
     """File of the arm's free-motion model, loaded at the start and saved at the end; by default one file per robot."""
-    learn_anew: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """Start without a free-motion model, and replace the saved one by what this run learns."""
     no_learnt: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Start without a free-motion model, and save none."""
 

@@ -8,10 +8,11 @@ from typing import cast
 import numpy as np
 
 from pretouch.arms import ArmOptions, OpenedArm
+from pretouch.calibration.motion.follow import standing_at
 from pretouch.cli.run.options import RobotOptions, SkinOptions, TaskOptions, UnitOptions
 from pretouch.cli.writing import check_writable
 from pretouch.contact.sequential_test import SequentialTest
-from pretouch.control.path import Circle, Path, WayPoints, segment
+from pretouch.control.path import Circle, Path, WayPoints
 from pretouch.controller import Controller
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.perception.scene_filter import floor_and_pedestal
@@ -29,9 +30,6 @@ from pretouch.sim.scene import SceneSpec
 from pretouch.types import FloatArray
 from pretouch.units.keys import load_keys
 from pretouch.units.skin import NetworkSkin
-
-_SHORTEST_M = 1e-5
-"""A path must have a length: over so little an arm stands."""
 
 
 @dataclass(frozen=True)
@@ -72,8 +70,7 @@ class RunSetup:
         if self.task.path == "line":
             ends = cast(WayPoints, self.placement.path("line", 1.0)).points
             return WayPoints(ends[np.argsort(np.linalg.norm(ends - here, axis=1), kind="stable")])
-        x, y, z = here.tolist()
-        return segment((x, y, z), (x, y, z + _SHORTEST_M))
+        return standing_at(here)
 
 
 def run_setup(arm: ArmOptions, robot: RobotOptions, units: SkinOptions, task: TaskOptions) -> RunSetup:
@@ -106,13 +103,13 @@ def run_setup(arm: ArmOptions, robot: RobotOptions, units: SkinOptions, task: Ta
 def free_motion(options: RobotOptions, controller: Controller, robot: str) -> FreeMotion | None:
     """Read the learnt free motion of a robot, and print it; None where none is remembered.
 
-    `options` are `learnt`, `learn_anew` and `no_learnt`; `robot` is the name that it is remembered by.
+    `options` are `learnt` and `no_learnt`; `robot` is the name that it is remembered by.
     """
     if not isinstance(controller.profile.detect, SequentialTest):
-        if options.learnt or options.learn_anew:
+        if options.learnt:
             raise ParameterError(
                 f"The profile {controller.profile.name} does not learn free motion: choose --profile pretouch, or leave"
-                " out --learnt and --learn-anew."
+                " out --learnt."
             )
         return None
     if options.no_learnt:
@@ -121,7 +118,7 @@ def free_motion(options: RobotOptions, controller: Controller, robot: str) -> Fr
     if options.learnt:
         file = ModelFile(robot, options.learnt, True)
         check_writable("free-motion file", file.path)
-    motion = FreeMotion(file, controller, options.learn_anew)
+    motion = FreeMotion(file, controller)
     say(motion.sentence)
     return motion
 
