@@ -19,7 +19,7 @@ from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.errors import ParameterError, RecordingError
 from pretouch.extras import FIGURES
 from pretouch.imported_data.detect import detect
-from pretouch.imported_data.log import TORQUES, Choice, LogFile
+from pretouch.imported_data.log import TORQUES, Choice
 from pretouch.imported_data.reading import ForceRecording, open_log, read_force
 from pretouch.imported_data.results import Course, DetectorResult
 from pretouch.imported_data.torques import TorqueRecording, torque_recording
@@ -90,7 +90,7 @@ class Detect(Choice):
     def _read(self, profiles: Sequence[Profile] | None) -> tuple[ForceRecording | TorqueRecording, list[str]]:
         """Return the torques or the force to detect on, and sentences on what is not used."""
         file, unused = open_log(self.file, self), list[str]()
-        if _by_torques(file, self, profiles):
+        if _by_torques(file.kinds, self, profiles):
             try:
                 return torque_recording(file.torques(), self), unused
             except RecordingError as error:
@@ -100,16 +100,16 @@ class Detect(Choice):
         return read_force(file, self), unused
 
 
-def _by_torques(file: LogFile, choice: Choice, profiles: Sequence[Profile] | None) -> bool:
-    """Return True if detectors run on joint torques: where the log has them and not only thresholds are requested."""
+def _by_torques(kinds: frozenset[str], choice: Choice, profiles: Sequence[Profile] | None) -> bool:
+    """Return True if detectors run on joint torques: where a log has their kind and not only thresholds are wanted."""
     if choice.frame == "ee":
         return False
     if choice.torques or choice.gains or choice.payload:
         return True
-    force, torques = "force" in file.kinds, bool(set(TORQUES) & file.kinds)
+    force, torques = "force" in kinds, bool(kinds.intersection(TORQUES))
     if choice.wrench or (force and profiles is not None and not any(p.detect.by_torques for p in profiles)):
         return False
-    return torques or ("q" in file.kinds and not force)
+    return torques or ("q" in kinds and not force)
 
 
 @dataclass(frozen=True)

@@ -48,9 +48,10 @@ class Bag:
             elif "force" not in kinds and self._has_efforts(reader):  # beside a force, efforts may be anything
                 kinds.add("tau")
         self.kinds = frozenset(kinds)
+        """Kinds of `Log` that it certainly contains."""
 
     def force(self, posture: bool) -> Log:
-        """Read the force, and perhaps positions; see `LogFile`."""
+        """Read the force, and where asked for the joint positions at its instants."""
         wrenches = self._of(WRENCH)
         name = self._one(wrenches, wrenches, "geometry_msgs/WrenchStamped", self._choice.wrench, "--wrench")
         if not posture:
@@ -58,7 +59,7 @@ class Bag:
         return _joined(self._read(name, self._position_topic("")), _POSTURE_GAP_S)
 
     def torques(self) -> Log:
-        """Read joint torques and positions; see `LogFile`."""
+        """Read one of `TORQUES`, with joint positions and perhaps velocities."""
         able = self._of(JOINT_STATE, *_STATES)
         external = [name for name in able if name.endswith(_EXTERNAL)]
         what = "sensor_msgs/JointState, FrankaState or FrankaRobotState"
@@ -72,7 +73,7 @@ class Bag:
         return _joined(self._read(name, self._position_topic(name)), _MOTION_GAP_S)
 
     def positions(self) -> Log:
-        """Read joint positions; see `LogFile`."""
+        """Read joint positions."""
         return _with_positions(self._read(self._position_topic(""))[0])
 
     @contextmanager

@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
@@ -135,22 +135,6 @@ class ImportedRecording:
     def rate(self) -> float:
         """Median rate of the samples [Hz]."""
         return float(1.0 / np.median(np.diff(self.time)))
-
-
-class LogFile(Protocol):
-    """A log that was opened: a table, or a bag."""
-
-    kinds: frozenset[str]
-    """Kinds of `Log` that it certainly contains."""
-
-    def force(self, posture: bool) -> Log:
-        """Read the force, and where asked for the joint positions at its instants."""
-
-    def torques(self) -> Log:
-        """Read one of `TORQUES`, with joint positions and perhaps velocities."""
-
-    def positions(self) -> Log:
-        """Read joint positions."""
 
 
 def arm_of(names: Sequence[str], arm: str | RobotModel) -> RobotModel:

@@ -1,6 +1,7 @@
 """Logs of other programs, opened, and what is read of them: a force, or joint positions for a calibration."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,7 +14,6 @@ from pretouch.imported_data.log import (
     Choice,
     ImportedRecording,
     Log,
-    LogFile,
     Note,
     check_reach,
 )
@@ -21,6 +21,10 @@ from pretouch.robot.model import RobotModel
 from pretouch.traces import JointTrace
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
+
+if TYPE_CHECKING:
+    from pretouch.imported_data.bags import Bag
+    from pretouch.imported_data.tables import Table
 
 _EE_FRAMES = ("_k", "_ee", "_tcp", "_hand", "link8", "tool0", "_flange")
 
@@ -39,7 +43,7 @@ class ForceRecording(ImportedRecording):
     """(N,) whether a joint turns; None where that is not known."""
 
 
-def open_log(place: Path, choice: Choice) -> LogFile:
+def open_log(place: Path, choice: Choice) -> "Bag | Table":
     """Open a log. RecordingError for what cannot be opened, and from what reads it, with the way out."""
     try:
         folder, file = place.is_dir(), place.is_file()
@@ -86,7 +90,7 @@ def read_joints(place: Path, model: RobotModel, topic: str = "") -> tuple[JointT
     return JointTrace(log.time / 1e9, log.arrays["q"]), log
 
 
-def read_force(file: LogFile, choice: Choice) -> ForceRecording:
+def read_force(file: "Bag | Table", choice: Choice) -> ForceRecording:
     """Read a force. RecordingError for what cannot be used, with the way out."""
     by_robot, in_ee = choice.sign == "by-robot", choice.frame == "ee"
     log = file.force(in_ee).in_order()

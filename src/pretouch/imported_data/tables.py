@@ -90,16 +90,16 @@ class Table:
         self.kinds = frozenset(column.kind for column in self._columns.values())
 
     def force(self, posture: bool) -> Log:
-        """Read the force, and perhaps positions; see `LogFile`."""
+        """Read the force, and where asked for the joint positions at its instants."""
         return self._read("force", *(["q"] if posture else []), also=("torque",))
 
     def torques(self) -> Log:
-        """Read joint torques and positions; see `LogFile`."""
+        """Read one of `TORQUES`, with joint positions and perhaps velocities."""
         torque = next((kind for kind in TORQUES if kind in self.kinds), TORQUES[0])
         return self._read("q", torque, also=("dq", "dq_d"))
 
     def positions(self) -> Log:
-        """Read joint positions; see `LogFile`."""
+        """Read joint positions."""
         return self._read("q")
 
     def _read(self, *needed: str, also: tuple[str, ...] = ()) -> Log:
