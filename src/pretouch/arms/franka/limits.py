@@ -36,6 +36,7 @@ from pretouch.errors import ParameterError
 from pretouch.profiles import Profile
 from pretouch.robot.description import RobotDescription, SpeedEnvelope, fr3, panda
 from pretouch.robot.model import RobotModel
+from pretouch.robot.postures import spread
 from pretouch.sensing.skin import Skin
 from pretouch.types import FloatArray
 
@@ -174,16 +175,9 @@ def collision_behavior(profile: Profile, model: RobotModel) -> CollisionBehavior
 
 
 def longest_levers(model: RobotModel) -> FloatArray:
-    """Largest torque (n,) on each joint [Nm] that 1 N at the end-effector gives in any posture, to a few per cent.
-
-    The postures fill the joints' ranges evenly: multiples of powers of one irrational number, modulo 1.
-    """
-    root = 1.0
-    for _ in range(60):
-        root = (1.0 + root) ** (1.0 / (model.n + 1))
-    share = np.outer(np.arange(1, _POSTURES + 1), root ** -np.arange(1, model.n + 1)) % 1.0
+    """Largest torque (n,) on each joint [Nm] that 1 N at the end-effector gives in any posture, to a few per cent."""
     longest = np.zeros(model.n)
-    for q in model.q_min + share * (model.q_max - model.q_min):
+    for q in model.q_min + spread(_POSTURES, model.n) * (model.q_max - model.q_min):
         jacobian = model.ee_jacobian(model.kinematics(q))
         longest = np.maximum(longest, np.linalg.norm(jacobian[:3], axis=0))
     return longest
