@@ -1,7 +1,5 @@
 """Findings on a unit whose place is estimated: unobserved directions, and the way it sits on its link."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from pretouch.calibration.fit import ACC_SCALE, GYRO_SCALE, PLACE, TURN
@@ -23,8 +21,6 @@ _POSITION_SIGMA_M = 0.01
 """An answer with a larger standard deviation of its position, in any direction, is refused [m]."""
 _ORIENTATION_SIGMA_DEG = 2.0
 """An answer with a larger standard deviation of its orientation, about any axis, is refused [degrees]."""
-_SAME = 0.9
-"""Share of a direction that lies in what is not known, from which on it is named as not known."""
 _UNUSUAL = 5.0
 """Standard deviations, as assumed, from which on an error of a scale is not its own."""
 _MANY = 0.05
@@ -96,10 +92,7 @@ def scale_findings(located: Located) -> list[Remark]:
 def unknown_finding(arm: ArmMotion, link: int, T: FloatArray, covariance: FloatArray) -> list[Remark]:
     """Say what of a place, T_link_sensor (4, 4) with its covariance (6, 6), is not known, and what to do."""
     model, moving = arm.model, arm.model.moved_by[link]
-    kin, last = model.kinematics(model.q_mid), int(np.flatnonzero(moving)[-1])
-    R = kin.rotation[link]
-    axis = Axis(model.joints[last], R.T @ (kin.anchor[last] - kin.position[link]), R.T @ kin.axis[last])
-    unknown = unknown_directions(covariance, T, axis)
+    unknown = unknown_directions(covariance, T)
     if not unknown:
         return []
     swing: FloatArray = np.ptp(arm.q[arm.usable], axis=0)
@@ -112,74 +105,26 @@ def unknown_finding(arm: ArmMotion, link: int, T: FloatArray, covariance: FloatA
     if len(lazy):
         way_out = f"Move {names} more."
     if moving.sum() == 1:
-        way_out = f"{axis.joint} alone moves {model.links[link]}, so no motion can determine it: measure it by hand."
+        (joint,) = np.array(model.joints)[moving]
+        way_out = f"{joint} alone moves {model.links[link]}, so no motion can determine it: measure it by hand."
     return [Remark("unobservable", f"Not known: {', and '.join(unknown)}. {way_out}", True)]
 
 
-@dataclass(frozen=True)
-class Axis:
-    """Axis of the last joint that moves a link, in the link's frame."""
-
-    joint: str
-    point: FloatArray
-    """(3,) [m]."""
-    direction: FloatArray
-    """(3,) unit vector."""
-
-
-def unknown_directions(covariance: FloatArray, T_link_sensor: FloatArray, axis: Axis) -> tuple[str, ...]:
+def unknown_directions(covariance: FloatArray, T_link_sensor: FloatArray) -> list[str]:
     """Describe the directions of a pose (4, 4) that are less certain than required.
 
-    `covariance` (6, 6) is of the rotation vector in the sensor frame [rad] and the position in the link frame [m];
-    `axis` is that of the last joint that moves the link.
+    `covariance` (6, 6) is of the rotation vector in the sensor frame [rad] and the position in the link frame [m].
     """
-    turned = np.eye(6)
-    turned[TURN, TURN] = T_link_sensor[:3, :3]
-    limit = np.repeat((np.deg2rad(_ORIENTATION_SIGMA_DEG), _POSITION_SIGMA_M), 3)
-    scaled = turned @ covariance @ turned.T / np.outer(limit, limit)
-    span, freedoms = _joint_freedoms(scaled, T_link_sensor[:3, 3] - axis.point, axis, limit)
-    return (*freedoms, *_directions(scaled, span, limit))
-
-
-def _joint_freedoms(
-    scaled: FloatArray, r: FloatArray, axis: Axis, limit: FloatArray
-) -> tuple[FloatArray, tuple[str, ...]]:
-    """Take what a joint's axis leaves open out of what is not known.
-
-    A turn about an axis moves the unit too: rotation and position are looked at together, in parts of their limits.
-
-    Returns:
-        (6, k) orthonormal columns: what else is not known; and the joint's own freedoms in words.
-    """
-    none = np.zeros(3)
-    freedoms = {
-        f"where it sits along the axis of {axis.joint}": np.concatenate([none, axis.direction]),
-        f"its angle about the axis of {axis.joint}": np.concatenate([axis.direction, np.cross(axis.direction, r)]),
-    }
-    variance, vectors = np.linalg.eigh(scaled)
-    span, words = vectors[:, variance > 1.0], []
-    for name, freedom in freedoms.items():
-        unit = freedom / limit / np.linalg.norm(freedom / limit)
-        if np.sum((unit @ span) ** 2) > _SAME:
-            words.append(name)
-            left, size, _ = np.linalg.svd(span - np.outer(unit, unit @ span), full_matrices=False)
-            span = left[:, size > 0.5]
-    return span, tuple(words)
-
-
-def _directions(scaled: FloatArray, span: FloatArray, limit: FloatArray) -> list[str]:
-    """Name the directions of position and orientation in what is spanned (6, k) that are beyond their limits."""
-    rest = span @ (span.T @ scaled @ span) @ span.T
-    words = []
-    for part, name, factor, si in (
-        (PLACE, "its position along", 1e3, "mm"),
-        (TURN, "its orientation about", np.rad2deg(1.0), "degrees"),
+    R, words = T_link_sensor[:3, :3], []
+    turn = R @ covariance[TURN, TURN] @ R.T
+    for part, limit, name, factor, unit in (
+        (covariance[PLACE, PLACE], _POSITION_SIGMA_M, "its position along", 1e3, "mm"),
+        (turn, np.deg2rad(_ORIENTATION_SIGMA_DEG), "its orientation about", np.rad2deg(1.0), "degrees"),
     ):
-        variance, vectors = np.linalg.eigh(rest[part, part])
-        for value, direction in zip(variance, vectors.T, strict=True):
-            if value > 1.0:
-                size = factor * np.sqrt(value) * limit[part][0]
-                words.append(f"{name} {_in_words(direction)} of the link (sigma {size:.3g} {si})")
+        variance, vectors = np.linalg.eigh(part)
+        for sigma, direction in zip(np.sqrt(np.maximum(variance, 0.0)), vectors.T, strict=True):
+            if sigma > limit:
+                words.append(f"{name} {_in_words(direction)} of the link (sigma {factor * sigma:.3g} {unit})")
     return words
 
 
