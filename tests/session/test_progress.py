@@ -103,19 +103,6 @@ def test_a_force_that_was_nearly_a_contact_is_told_with_what_it_lacked(watched):
     assert said.endswith(" N would have been a contact then.")
 
 
-def test_a_contact_that_does_not_move_the_arm_is_counted_as_what_it_is(watched):
-    reporter, _, cycles, turn = watched
-    turn(120)
-    still = {"mode": Mode.REACT, "command": np.zeros(7), "reaction_velocity": np.zeros(3)}
-    moves = {"mode": Mode.REACT, "command": np.full(7, 0.1), "reaction_velocity": np.full(3, 0.1)}
-    contact = Contact(np.array([0.0, 9.0, 0.0]), np.ones(3, bool))
-    for changes in ({**still, "contact": contact}, still, {}, {**moves, "contact": contact}, moves, {}):
-        turn(1)
-        reporter.record(replace(cycles[-1], step=replace(cycles[-1].step, **changes)))
-    assert (reporter.summary.contacts, reporter.summary.unmoved) == (2, 1)
-    assert "2 contacts, 1 of which did not move the arm." in reporter.summary.sentences(0.01)[0]
-
-
 # what is said of pushes, by steps made by hand
 
 

@@ -31,8 +31,6 @@ class RunSummary:
 
     steps: int = 0
     contacts: int = 0
-    unmoved: int = 0
-    """Contacts that the arm did not move with, for they were below what moves it."""
     holds: dict[str, float] = field(default_factory=dict)
     """Time held [s] by the sentence with which an event first held the arm."""
 
@@ -40,8 +38,7 @@ class RunSummary:
         """Return the summary in sentences."""
         sentences = [
             f"{self.steps} control steps, {self.steps * period:.1f} s; {self.contacts}"
-            f" {'contact' if self.contacts == 1 else 'contacts'}"
-            + (f", {self.unmoved} of which did not move the arm." if self.unmoved else ".")
+            f" {'contact' if self.contacts == 1 else 'contacts'}."
         ]
         lasting = [(seconds, reason) for reason, seconds in self.holds.items() if seconds >= _BRIEF_S]
         sentences += [f"Held for {seconds:.1f} s: {reason}" for seconds, reason in sorted(lasting, reverse=True)]
@@ -55,7 +52,6 @@ class ProgressReporter:
         """Take another recorder, what tells a sentence without waiting, what to do where a HOLD latches, and whose."""
         self._further, self._tell, self._latched, self._period = further, tell, latched, of.limits.period
         self._names = of.skin.ids if of.profile.perception else (), of.model.links
-        self._answered = True
         self._nearest: ControlStep | None = None
         self._kind: tuple[Mode, Event | Doing | bool, bool] | None = None
         self._line_due = self._line_time = self._near_due = -np.inf
@@ -68,7 +64,6 @@ class ProgressReporter:
         step, summary = cycle.step, self.summary
         summary.steps += 1
         summary.contacts += step.contact is not None
-        self._count_answer(step)
         self._note_near_contact(step)
         if step.mode is Mode.HOLD:
             reason = self._examples.setdefault(step.event, step.reason)
@@ -83,14 +78,6 @@ class ProgressReporter:
         elif self._kind is None or kind[0] is not self._kind[0] or step.stamp >= self._line_time + _AGAIN_S:
             self._kind, self._line_time = kind, step.stamp
             self._say(step, account.sentence)
-
-    def _count_answer(self, step: ControlStep) -> None:
-        """Count a contact that ended without a motion of the arm."""
-        if step.contact is not None:
-            self._answered = False
-        self._answered = self._answered or answers(step)
-        if step.mode is not Mode.REACT and not self._answered:
-            self.summary.unmoved, self._answered = self.summary.unmoved + 1, True
 
     def _note_near_contact(self, step: ControlStep) -> None:
         """Report what a force near a contact lacked: somebody may have pushed."""
