@@ -5,8 +5,7 @@ import pytest
 
 from pretouch.recording.run_record import TrueForces
 from pretouch.reporting.contacts import contact_section, touches_of
-from pretouch.reporting.measures import measure
-from pretouch.reporting.motion import nearest_to_body
+from pretouch.reporting.measures import measure, nearest_to_body
 from pretouch.reporting.page import summary
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import mean_over

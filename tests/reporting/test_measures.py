@@ -8,7 +8,7 @@ from pretouch.modes import Event
 from pretouch.profiles import profile
 from pretouch.reporting.health import loop_row, unit_row
 from pretouch.reporting.html import bad, number
-from pretouch.reporting.motion import (
+from pretouch.reporting.measures import (
     distance_section,
     holds_in,
     limit_rows,

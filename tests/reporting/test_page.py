@@ -9,8 +9,7 @@ from pretouch.modes import Event
 from pretouch.profiles import profile
 from pretouch.reporting.contacts import contact_section
 from pretouch.reporting.html import bad, number, percent, table
-from pretouch.reporting.measures import measure
-from pretouch.reporting.motion import limit_section, orientation_section
+from pretouch.reporting.measures import force_section, limit_section, measure
 from pretouch.reporting.page import page, summary
 from pretouch.reporting.record import gather
 from pretouch.reporting.setting import parameter_section, setting_section
@@ -65,11 +64,11 @@ def test_the_page_fetches_nothing_and_runs_nothing(reader):
 def test_everything_that_was_asked_for_is_on_the_page(reader):
     for words in (
         "What ran", "Detected contacts", "True touches (simulation)", "Proximity was not used", "Speed",
-        "Modes and quadratic program", "Limits of the arm", "Units, robot and loop", "ISO/TS 15066:2016, table A.2",
-        "for orientation, not conformity", "Parameters", "detect.f_base_n", "panda_hand", "1 of 100 samples",
+        "Modes and quadratic program", "Limits of the arm", "Units, robot and loop", "Largest true force",
+        "For orientation, not conformity", "Parameters", "detect.f_base_n", "panda_hand", "1 of 100 samples",
     ):  # fmt: skip
         assert words in reader.said, words
-    assert reader.tags.count("figure") == 4
+    assert reader.tags.count("figure") == 3
 
 
 def test_several_recordings_are_compared_first(touched, panda_model, paper_skin):
@@ -169,7 +168,7 @@ CUT = "The file ends in the middle of a chunk."
         (summary, {"complete": False, "sentence": CUT}, bad(CUT)),
         (lambda m: setting_section(m.course, m.lacking), {"complete": False, "sentence": CUT}, bad(CUT)),
         (lambda m: contact_section(m.course, m.contacts), {}, "True touches are not known"),
-        (lambda m: orientation_section(m.contacts), {}, "understates the peaks of impacts"),
+        (lambda m: force_section(m.contacts), {}, "understates the peaks of impacts"),
         (lambda m: limit_section(m.course), {}, '<span class="bad">Exceeded: velocity of joint 1'),
     ],
 )
@@ -186,7 +185,7 @@ def test_text_of_a_file_stays_text(panda_model, paper_skin):
     hostile = made.Recorded((run,), [made.Kept(0, None, s) for s in steps], False, evil)
     reader = Reader(page([measure(hostile, evil)]))
     assert "script" not in reader.tags
-    assert reader.tags.count("img") == 3
+    assert reader.tags.count("img") == 2
     assert any(evil in text for text in reader.text)
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from pretouch import cli
-from pretouch.cli.report import WriteReport, titles
+from pretouch.cli.report import WriteReport
 from pretouch.controller import Controller
 from pretouch.errors import ExperimentError, RecordingError
 from pretouch.loop import Cycle
@@ -14,8 +14,7 @@ from pretouch.profiles import profile
 from pretouch.recording.reader import open_recording
 from pretouch.recording.writer import Recording
 from pretouch.reporting.health import health_section
-from pretouch.reporting.measures import measure
-from pretouch.reporting.motion import limit_section, mode_section
+from pretouch.reporting.measures import limit_section, measure, mode_section
 from pretouch.sim.scene import SceneSpec, fixtures
 
 
@@ -98,7 +97,3 @@ def test_a_name_that_is_no_text_can_be_reported(folder, tmp_path):
     odd = tmp_path / os.fsdecode(b"odd\xff.mcap")
     odd.write_bytes((folder[0] / "trial.mcap").read_bytes())
     assert "odd?.mcap" in written([odd], tmp_path / "page.html")
-
-
-def test_titles_tell_files_apart_by_as_little_as_they_can(tmp_path):
-    assert titles([tmp_path / "a" / "x", tmp_path / "b" / "x", tmp_path / "y"]) == ["a/x", "b/x", "y"]

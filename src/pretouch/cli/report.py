@@ -1,7 +1,5 @@
 """`pretouch report`: one page on recordings."""
 
-import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,17 +34,9 @@ class WriteReport:
         from pretouch.reporting.measures import measure
         from pretouch.reporting.page import page  # needs the extra
 
-        titled = zip(self.files, titles(self.files), strict=True)
-        text = page(measure(open_recording(place), title) for place, title in titled)
+        names = [place.name for place in self.files]
+        titles = (str(place) if names.count(place.name) > 1 else place.name for place in self.files)
+        text = page(measure(open_recording(place), title) for place, title in zip(self.files, titles, strict=True))
         with unwritable_said("report", self.out):
             self.out.write_text(text, encoding="utf-8", errors="replace")  # a file name may be no text
         print(f"Report: {self.out}")
-
-
-def titles(files: Sequence[Path]) -> list[str]:
-    """Name of each file; where two have the same, their places below the folder that all are in."""
-    names, whole = [place.name for place in files], [place.absolute() for place in files]
-    if len(set(names)) == len(set(whole)):
-        return names
-    common = os.path.commonpath([place.parent for place in whole])
-    return [str(place.relative_to(common)) for place in whole]

@@ -15,13 +15,12 @@ from matplotlib.figure import Figure
 from pretouch.recording.run_record import MODES
 from pretouch.reporting.contacts import AXES
 from pretouch.reporting.html import Html, element, html
-from pretouch.reporting.motion import d_crit, d_notice, within_d_max
+from pretouch.reporting.measures import d_crit, d_notice
 from pretouch.reporting.record import RunCourse
 from pretouch.types import FloatArray, Mode
 
 INK, BLUE, RED, GREEN, AMBER, GREY = "#1f2933", "#2b6cb0", "#c53030", "#2f855a", "#b7791f", "#a0aab4"
 _SHADES = {Mode.REACT: (RED, 0.16), Mode.HOLD: (GREY, 0.28)}
-_COLOURS = {Mode.TRACK: INK, Mode.REACT: RED, Mode.HOLD: GREY}
 _LINE_COLOURS = (BLUE, AMBER, GREEN, INK, "#805ad5", "#b83280", "#0b7285", GREY)
 _LINES = tuple(zip(_LINE_COLOURS, ("-", "--", "-.", ":", "-", "--", "-.", "-"), strict=True))
 """Colour and style of each of several lines; more lines than these begin again."""
@@ -29,9 +28,6 @@ _SWITCHES = 12
 """More changes of the profile than this are not drawn."""
 _BEFORE_S, _AFTER_S = 0.3, 0.7
 """Time shown about a contact [s]."""
-_SENSED = 400
-"""Sensed points that are drawn: more would hide each other."""
-_LEAST_SIDE_M = 0.4
 _MARKS = 3
 """Order of what is drawn over the lines, and never as pixels."""
 _MOST_DRAWN = 3000
@@ -172,33 +168,3 @@ def _plain(name: str) -> str:
     """Write a name from a file so that Matplotlib shows it as it is: no formula, and not hidden."""
     plain = name.replace("\\", "\\\\").replace("$", r"\$") if "$" in name else name
     return f" {plain}" if plain.startswith("_") else plain
-
-
-def path_figure(course: RunCourse) -> Figure:
-    """Path, end-effector by mode, and the nearest sensed points, seen from the front (+x)."""
-    figure = Figure(figsize=(7.2, 5.6), layout="constrained")
-    axes: Axes = figure.subplots()
-    _frame(axes, course)
-    _, *path = course.path_position.T
-    axes.plot(*path, color=BLUE, lw=6, alpha=0.25, solid_capstyle="round", label="path")
-    for i, mode in enumerate(MODES):
-        flags = course.mode == i
-        if flags.any():
-            until = flags | np.append(False, flags[:-1])
-            _, *at = np.where(
-                until[:, None], course.ee_position, np.nan
-            ).T  # where it is not in the mode the line breaks
-            axes.plot(*at, color=_COLOURS[mode], lw=1.5, label=mode.name)
-    near = np.flatnonzero(within_d_max(course))
-    _, *point = course.nearest_point[near[:: max(1, len(near) // _SENSED)]].T
-    if len(near):
-        dots: Any = {"color": GREEN, "alpha": 0.5, "mew": 0, "ms": 3.5, "zorder": 1, "label": "nearest sensed"}
-        axes.plot(*point, "o", **dots)
-    axes.set_aspect("equal")
-    for get, put in ((axes.get_xlim, axes.set_xlim), (axes.get_ylim, axes.set_ylim)):
-        low, high = get()
-        lacking = max(0.0, _LEAST_SIDE_M - (high - low)) / 2  # a straight path has no height
-        put(low - lacking, high + lacking)
-    axes.set(xlabel="y [m]", ylabel="z [m]")
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize="small")
-    return figure

@@ -7,9 +7,9 @@ from matplotlib.figure import Figure
 
 from pretouch.contact.scatter import HELD_S
 from pretouch.explanation import LOUD_N
-from pretouch.reporting import motion
+from pretouch.reporting import measures
 from pretouch.reporting.contacts import ContactMeasures, contact_section
-from pretouch.reporting.figures import close_up_figure, force_figure, motion_figure, path_figure, picture, style
+from pretouch.reporting.figures import close_up_figure, force_figure, motion_figure, picture, style
 from pretouch.reporting.health import health_section
 from pretouch.reporting.html import Html, Row, Text, bad, document, element, joined, number, percent, table, table_html
 from pretouch.reporting.measures import Measures
@@ -60,19 +60,18 @@ def _recording(m: Measures) -> list[Text]:
         picture(force_figure(course), f"{forces} {_SHADED}"),
         *_strongest(m),
         element("h3", "Distances"),
-        motion.distance_section(course),
+        measures.distance_section(course),
         element("h3", "Speed"),
-        motion.speed_section(course),
+        measures.speed_section(course),
         picture(motion_figure(course), f"{prefix}peed of the end-effector, and speed factor. {_SHADED}"),
-        picture(path_figure(course), "Path and end-effector seen from the front of the arm (from +x)."),
         element("h3", "Modes and quadratic program"),
-        motion.mode_section(course),
+        measures.mode_section(course),
         element("h3", "Limits of the arm"),
-        motion.limit_section(course),
+        measures.limit_section(course),
         element("h3", "Units, robot and loop"),
         health_section(course),
-        element("h3", "Forces beside limits of body regions: for orientation, not conformity"),
-        motion.orientation_section(m.contacts),
+        element("h3", "Largest forces"),
+        measures.force_section(m.contacts),
         element("h3", "Parameters"),
         parameter_section(course),
     ]
@@ -91,7 +90,7 @@ def _strongest(m: Measures) -> list[Html]:
 
 def summary(m: Measures) -> Html:
     """Say the most important of a recording."""
-    shares = {mode: percent(share) for mode, (_, share) in motion.time_in_modes(m.course).items()}
+    shares = {mode: percent(share) for mode, (_, share) in measures.time_in_modes(m.course).items()}
     sentences: list[Text] = [
         _what(m.course),
         _contacts(m.contacts),
@@ -151,7 +150,7 @@ def _forces(c: ContactMeasures) -> str:
 
 
 def _nearest(course: RunCourse) -> str:
-    nearest = motion.nearest_to_body(course)
+    nearest = measures.nearest_to_body(course)
     if not course.proximity_used:
         return "Proximity was not used."
     if nearest is None:
@@ -165,9 +164,9 @@ def _compared(order: int, m: Measures) -> Row:
     link = Html(f'<a href="#recording-{order}">{element("span", m.title)}</a>')
     c, body, fastest, modes = (
         m.contacts,
-        motion.nearest_to_body(m.course),
+        measures.nearest_to_body(m.course),
         spread(m.course.speed),
-        motion.time_in_modes(m.course),
+        measures.time_in_modes(m.course),
     )
     steps = [d.step for d in c.detections]
     return {
