@@ -8,7 +8,6 @@ import signal
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from types import SimpleNamespace
 
 import pytest
 
@@ -143,14 +142,6 @@ def test_timers_are_sharp_meanwhile():
         assert prctl(30, 0, 0, 0, 0) == 1
     assert prctl(30, 0, 0, 0, 0) == 40_000
     prctl(29, first, 0, 0, 0)
-
-
-def test_elsewhere_than_on_linux_one_sentence_says_so(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(realtime, "sys", SimpleNamespace(platform="darwin"))
-    with realtime.real_time(priority=80, cpu=1) as missing:
-        assert not gc.isenabled()
-    (said,) = missing
-    assert said.startswith("This is darwin, not Linux")
 
 
 class Arm(World):

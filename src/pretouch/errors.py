@@ -64,9 +64,5 @@ class ViewerError(PretouchError, RuntimeError):
     """The page cannot be shown."""
 
 
-class UsageError(PretouchError, ValueError):
-    """The arguments of a command line are wrong."""
-
-
 class PluginError(PretouchError, RuntimeError):
     """A part that another distribution adds is missing, or cannot be loaded."""

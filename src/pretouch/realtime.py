@@ -4,7 +4,6 @@ import ctypes
 import gc
 import math
 import os
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
@@ -106,17 +105,12 @@ def real_time(priority: int | None = None, cpu: int | None = None) -> Iterator[t
     check_wishes(priority, cpu)
     with ExitStack() as undo:
         undo.enter_context(_no_collections())
-        if sys.platform == "linux":
-            _sharpen_timers(undo)
-            yield tuple(filter(None, (_go_first(priority, undo), _stay(cpu, undo))))
-        else:
-            yield (f"This is {sys.platform}, not Linux: the loop runs without priority, and wakes as late as it does.",)
+        _sharpen_timers(undo)
+        yield tuple(filter(None, (_go_first(priority, undo), _stay(cpu, undo))))
 
 
 def check_wishes(priority: int | None, cpu: int | None) -> None:
     """Raise ParameterError, with the choices, for a priority or processor that does not exist."""
-    if sys.platform != "linux":
-        return
     low, high = os.sched_get_priority_min(os.SCHED_FIFO), os.sched_get_priority_max(os.SCHED_FIFO)
     if priority is not None and not low <= priority <= high:
         raise ParameterError(f"The real-time priority is {priority}: give {low} to {high}.")

@@ -11,7 +11,7 @@ import tyro
 from rich.console import Console
 
 from pretouch.cli.app import COMMANDS, SHELLS, Command, command_class, command_names, overview, split_name
-from pretouch.errors import PluginError, PretouchError, UsageError
+from pretouch.errors import ParameterError, PluginError, PretouchError
 from pretouch.signals import Terminated, ends_raise, exit_code
 
 # a command's module takes up to a second to import: of all commands, only the one that is named is loaded
@@ -84,7 +84,7 @@ def _loaded(names: Sequence[str], errors: Console) -> dict[str, Any]:
 def _write_completion(shells: Sequence[str], errors: Console) -> NoReturn:
     """Print what a shell needs to complete the words of all commands, and end."""
     if len(shells) != 1 or shells[0] not in SHELLS:
-        raise UsageError(f"pretouch completion is for one shell: choose from {', '.join(SHELLS)}.")
+        raise ParameterError(f"pretouch completion is for one shell: choose from {', '.join(SHELLS)}.")
     tree: dict[str, dict[str, Any]] = {}
     for name, kind in _loaded(command_names(), errors).items():
         first, _, second = name.partition(" ")

@@ -9,7 +9,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import tyro
 from rich.console import Console
 from rich.progress import Progress
@@ -20,7 +19,7 @@ from pretouch.cli.warm_up import prepare
 from pretouch.cli.writing import STANDARD_OUTPUT, numbers_to
 from pretouch.page.server import ServeOptions, begun, browser_here
 from pretouch.profiles import profile as find_profile
-from pretouch.recording.compare import Comparison, Decisions, DetectedContact, compare
+from pretouch.recording.compare import Comparison, DetectedContact, compare
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.verify import verify as recompute
 from pretouch.signals import ended
@@ -158,11 +157,6 @@ def _show(console: Console, comparison: Comparison) -> None:
     rows = [(*_cells(a), *_cells(b), f"{b.time_s - a.time_s:+.2f}" if a and b else "") for a, b in comparison.pairs]
     header = "recorded at [s]", "force [N]", "axes", "other at [s]", "force [N]", "axes", "later by [s]"
     console.print(PlainTable(header, rows or [("none", "", "", "none", "", "", "")], left=()), crop=False)
-    console.print(
-        "Thresholds from their middle, median along x / y / z:"
-        f" {_width(mine)} N ({mine.name}), {_width(other)} N ({other.name}).",
-        markup=False,
-    )
     if comparison.left_out:
         left_out = f"{_many(comparison.left_out, 'step')} left out, without usable inputs in the recording."
         console.print(left_out, markup=False)
@@ -172,10 +166,3 @@ def _show(console: Console, comparison: Comparison) -> None:
 
 def _cells(contact: DetectedContact | None) -> tuple[str, str, str]:
     return ("-", "", "") if contact is None else (f"{contact.time_s:.3f}", f"{contact.norm_n:.1f}", contact.axes)
-
-
-def _width(decisions: Decisions) -> str:
-    armed = decisions.armed
-    if not armed.any():
-        return "-"
-    return " / ".join(f"{value:.1f}" for value in np.median((decisions.upper - decisions.lower)[armed] / 2, axis=0))

@@ -53,15 +53,10 @@ def check_outputs(outputs: Iterable[tuple[str, Path | None]], inputs: Iterable[P
         if place and str(place) != STANDARD_OUTPUT:
             if any(same_file(other, place) or same_file(place, other) for other in places):
                 raise ExperimentError(f"The {what} {place} is also another input or output file: give another name.")
-            check_free(what, place, replace)
+            if place.is_file() and not replace:
+                raise ExperimentError(f"The {what} {place} exists already: give another name, or --replace.")
             check_writable(what, place)
             places.append(place)
-
-
-def check_free(what: str, place: Path, replace: bool) -> None:
-    """Raise ExperimentError for a file that is there and not to be replaced."""
-    if place.is_file() and not replace:
-        raise ExperimentError(f"The {what} {place} exists already: give another name, or --replace.")
 
 
 def same_file(one: Path, other: Path) -> bool:

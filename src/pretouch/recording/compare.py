@@ -137,9 +137,9 @@ def compare(recorded: "Recorded", profile: Profile, progress: Callable[[int], No
 
 
 def paired(
-    first: Sequence[DetectedContact], second: Sequence[DetectedContact], within: float = SAME_CONTACT_S
+    first: Sequence[DetectedContact], second: Sequence[DetectedContact]
 ) -> tuple[tuple[DetectedContact | None, DetectedContact | None], ...]:
-    """Pair contacts of two detectors that are within a time [s] of each other, the closest first; in time order.
+    """Pair contacts of two detectors that are one by `SAME_CONTACT_S`, the closest first; in time order.
 
     What only one of them has is paired with None.
     """
@@ -147,7 +147,7 @@ def paired(
         (abs(a.time_s - b.time_s), i, j)
         for i, a in enumerate(first)
         for j, b in enumerate(second)
-        if abs(a.time_s - b.time_s) <= within
+        if abs(a.time_s - b.time_s) <= SAME_CONTACT_S
     )
     partner: dict[int, int] = {}
     for _, i, j in close:

@@ -4,32 +4,21 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from reprlib import Repr
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
 from pretouch.controller import Controller, ControllerState
-from pretouch.desired import Desired
 from pretouch.errors import RecordingError
 from pretouch.loop import Cycle
 from pretouch.recording import ros
 from pretouch.recording.disk import Item
 from pretouch.recording.packing import decoder, packed, unpacked, with_parts
-from pretouch.recording.ros import PACKED, encode, own, packed_message
+from pretouch.recording.ros import PACKED, encode, hints_of, own, packed_message
 from pretouch.recording.run import packed_run
 from pretouch.recording.simulation import Truth
 from pretouch.recording.viewer_topics import KINDS, nanoseconds
-from pretouch.types import (
-    ControlStep,
-    FloatArray,
-    Inputs,
-    MovingFixtures,
-    Payload,
-    RangeReadings,
-    RobotState,
-    SeenPoints,
-    TouchReadings,
-)
+from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RobotState, SeenPoints
 from pretouch.values import value
 
 SNAPSHOT_S = 3.0
@@ -37,13 +26,7 @@ SNAPSHOT_S = 3.0
 RUN, INPUTS, STATE, STEP, TRUTH = (f"/pretouch/{name}" for name in ("run", "inputs", "state", "step", "truth"))
 TOPICS = {RUN: PACKED, INPUTS: PACKED, STATE: PACKED, STEP: own("Step"), TRUTH: own("Truth")}
 """Type of the messages on each of our topics."""
-_PARTS = {
-    "touch": TouchReadings,
-    "points": SeenPoints,
-    "payload": Payload,
-    "desired": Desired,
-    "moving": MovingFixtures,
-}
+_PARTS = {name: kinds[0] for name, hint in hints_of(Inputs) if (kinds := get_args(hint))}
 """Optional parts of inputs beside the arm's state and the readings."""
 _SHOWN = 500
 """Characters of what cannot be kept that are."""

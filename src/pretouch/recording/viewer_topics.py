@@ -146,7 +146,8 @@ def range_item(
 ) -> Item:
     """Return a unit's reading measured at a stamp [s], logged at an instant [ns]: distance [m] and `RangeStatus`."""
     at = header(nanoseconds(stamp, time), unit_id)
-    seen_m = _single(distance) if status in _MEASURED else math.inf
+    with np.errstate(over="ignore"):  # what float32 cannot hold is infinite
+        seen_m = float(np.float32(distance)) if status in _MEASURED else math.inf
     sees = sensor.angle, sensor.nearest_m, sensor.farthest_m
     topic = f"/skin/{topic_name(unit_id)}/range"
     return item(topic, RANGE, sequence, time, at, _INFRARED, *sees, seen_m, _ACCURACY_M**2)
@@ -179,9 +180,3 @@ def _capsule_markers(capsules: Capsules, links: tuple[str, ...], time: int) -> l
 def _fitting(array: FloatArray, like: FloatArray) -> FloatArray:
     """Return an array of float64 if it is as long as another one, and else an empty one."""
     return array if array.shape == like.shape and array.dtype == np.float64 else np.zeros(0)
-
-
-def _single(number: float) -> float:
-    """Return a number that float32 can hold: one beyond is infinite."""
-    with np.errstate(over="ignore"):
-        return float(np.float32(number))

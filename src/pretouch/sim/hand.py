@@ -79,11 +79,6 @@ class Hand:
         """Position of the hand (3,) [m], base frame."""
         return np.asarray(self._memory.places[AT_HOME] + self._memory.position)
 
-    @property
-    def velocity(self) -> FloatArray:
-        """Velocity of the hand (3,) [m/s]."""
-        return self._memory.velocity.copy()
-
     def _drive(self, time: float) -> float:
         goal = self._script.goal(time, self.position, self._plant)
         places, numbers = self._memory.places, self._memory.numbers
@@ -130,9 +125,9 @@ FACES = np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
 """Outward normals of the faces of the robot's hand that are pushed, in its frame: right, left, front."""
 
 
-def against(face: FloatArray, rng: np.random.Generator, tilt: float = 0.25) -> FloatArray:
-    """Draw the direction (3,) of a push against a face: its normal, each component off by up to `tilt`."""
-    inwards = tilt * rng.uniform(-1, 1, 3) - face
+def against(face: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Draw the direction (3,) of a push against a face: its normal, each component off by up to a quarter."""
+    inwards = 0.25 * rng.uniform(-1, 1, 3) - face
     return np.asarray(inwards / np.linalg.norm(inwards))
 
 

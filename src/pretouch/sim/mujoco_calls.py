@@ -14,7 +14,7 @@ from numba import types
 
 # the library that the Python package has loaded already; by its names compiled code finds the functions, kept code too
 for _file in Path(mujoco.__file__).parent.iterdir():
-    if _file.name.startswith("libmujoco") or _file.name == "mujoco.dll":
+    if _file.name.startswith("libmujoco"):
         binding.load_library_permanently(str(_file))
 
 _ADDRESS, _NUMBER = types.intp, types.intc
