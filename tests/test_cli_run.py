@@ -14,8 +14,8 @@ from pretouch import cli, plugins
 from pretouch.arms import OpenedArm
 from pretouch.arms.simulated import Simulated
 from pretouch.arms.simulated.arm import ThreadedArm
+from pretouch.cli.options import RobotOptions, SkinOptions, TaskOptions
 from pretouch.cli.run.command import Run
-from pretouch.cli.run.options import RobotOptions, SkinOptions, TaskOptions
 from pretouch.cli.run.setup import run_setup
 from pretouch.recording.disk import Disk
 from pretouch.recording.reader import open_recording

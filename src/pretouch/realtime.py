@@ -138,9 +138,7 @@ def _no_collections() -> Iterator[None]:
 
 def _sharpen_timers(undo: ExitStack) -> None:
     """Remove the 50 us of slack that Linux gives the timers of ordinary threads."""
-    prctl = getattr(ctypes.CDLL(None), "prctl", None)
-    if prctl is None:
-        return
+    prctl = ctypes.CDLL(None).prctl
     before = prctl(_PR_GET_TIMERSLACK, 0, 0, 0, 0)
     # a thread with real-time priority has none already
     if before > 0 and prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0) == 0:

@@ -71,7 +71,7 @@ def custom_arm(folder: Path) -> RobotDescription:
       <body name="b" pos="0 0 0.3"><joint name="j2" axis="0 1 0" range="-2 2" limited="true"/>
       <geom type="capsule" size="0.04 0.1" mass="1"/></body></body></worldbody></mujoco>""")
     two = np.ones(2)
-    return RobotDescription("two", place, "b", 2.1 * two, 3.3 * two, 9.0 * two, 0.1 * two, "a test")
+    return RobotDescription("two", place, "b", 2.1 * two, 3.3 * two, 9.0 * two, 0.1 * two, "a test\nof two lines")
 
 
 def record(run: Run, place: Path, cycles: int, change: Change = lambda _, inputs: inputs, about: Any = None) -> Run:

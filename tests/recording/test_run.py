@@ -112,10 +112,3 @@ def test_the_envelope_of_an_arm_is_made_again(tmp_path, fr3_model):
     made = open_recording(tmp_path / "a.mcap").runs[0].model.description
     assert same(made.envelope, fr3_model.description.envelope)
     assert made.mjcf == fr3_model.description.mjcf
-
-
-@pytest.mark.parametrize("source", ["", "two\nlines"])
-def test_a_source_of_any_text_is_kept(tmp_path, source):
-    model = RobotModel(replace(custom_arm(tmp_path), source=source))
-    recorded_run(tmp_path / "a.mcap", controller_of(model, Skin([], model)), 2)
-    assert open_recording(tmp_path / "a.mcap").runs[0].model.description.source == source

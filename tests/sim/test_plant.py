@@ -246,21 +246,6 @@ def test_a_state_is_consistent_and_stays_as_it_was_read(panda_model):
     assert all(map(np.array_equal, kept, (state.q, state.qd, state.q_commanded, state.tau_ext)))
 
 
-@pytest.mark.parametrize(
-    ("q", "singular"),
-    [
-        ((0.0, -0.3, 0.0, -0.5, 0.0, 0.2, 0.0), True),  # stretched upwards, the wrist over the shoulder
-        ((0.0, 0.0, 0.0, -0.0698, 0.0, 3.3, 0.0), True),  # stretched to the elbow's limit
-        ((0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785), False),
-    ],
-)
-def test_near_a_singularity_there_is_no_wrench(panda_model: RobotModel, q, singular):
-    plant = Plant(panda_model, SceneSpec(), PlantParams(), np.array(q), seed=0)
-    plant.advance(0.1)
-    assert (plant.read().wrench is None) == singular
-    assert np.all(np.isfinite(plant.read().tau_ext))
-
-
 def test_the_true_force_is_logged_zero_without_contact_and_a_log_that_is_taken_begins_anew(panda_model):
     plant = arm(panda_model)
     plant.advance(0.003)

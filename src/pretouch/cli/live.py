@@ -6,8 +6,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal
 
-from pretouch.cli.options import OptionalFile
-from pretouch.cli.run.options import UnitOptions
+from pretouch.cli.options import OptionalFile, UnitOptions
 from pretouch.cli.warm_up import prepare
 from pretouch.extras import LIVE
 from pretouch.page.real_units import RealUnits

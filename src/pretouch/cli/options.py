@@ -1,13 +1,18 @@
-"""Types of options that several commands have, and the word that names an arm."""
+"""Types of options, groups of options that several commands have, and the word that names an arm."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal, TypeVar
 
 import tyro
 from tyro.constructors import PrimitiveConstructorSpec
 
-from pretouch.arms import DEFAULT
+from pretouch.arms import DEFAULT, ArmOptions
+from pretouch.errors import HardwareError
+from pretouch.units import HOST, PORT
+
+A = TypeVar("A", bound=ArmOptions)
 
 
 def _listed(kind: Callable[[str], Any], metavar: str, noun: str) -> PrimitiveConstructorSpec[tuple[Any, ...]]:
@@ -52,3 +57,63 @@ def split_arm(words: Sequence[str]) -> tuple[str, Sequence[str]]:
     if words and not words[0].startswith("-"):
         return words[0], words[1:]
     return DEFAULT, words
+
+
+@dataclass(frozen=True)
+class RobotOptions:
+    """The arm's model, and what is remembered of it."""
+
+    arm: str = "panda"
+    """Model of the arm: panda, fr3, or the folder of an imported arm."""
+    confirm_push: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Ask for the guided pushes even if the force sign of this robot is confirmed."""
+    learnt: OptionalFile = None
+    """File of the arm's free-motion model, loaded at the start and saved at the end; by default one file per robot."""
+    no_learnt: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Start without a free-motion model, and save none."""
+
+
+@dataclass(frozen=True)
+class UnitOptions:
+    """Keys of the sensor units, and the address to receive them at."""
+
+    keys: OptionalFile = None
+    """File of the keys of units that are received over the network; without it, the arm's own or simulated ones."""
+    units_host: str = HOST
+    """Address to receive units at; real ones need 0.0.0.0, which is every address of this machine."""
+    units_port: int = PORT
+    """UDP port to receive units at."""
+
+    def __post_init__(self) -> None:
+        if not self.units_host:
+            raise HardwareError("--units-host is empty: give 127.0.0.1, or 0.0.0.0 for every address of this machine.")
+
+
+@dataclass(frozen=True)
+class SkinOptions(UnitOptions):
+    """The sensor units."""
+
+    skin: OptionalFile = None
+    """Skin file; by default the seven units that come with the package."""
+    no_skin: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """The arm carries no units. The profile must not need any, such as blind."""
+
+
+@dataclass(frozen=True)
+class TaskOptions:
+    """Task of the arm."""
+
+    path: Literal["circle", "line", "hold"] = "circle"
+    """circle and line: the paper's paths, started at the nearest point. hold: stay in place, and yield when touched."""
+    center: tuple[float, float, float] | None = None
+    """Centre of the circle [m], base frame; by default 0.5 0 0.25, for an imported arm where it reaches."""
+    radius: float | None = None
+    """Radius of the circle [m]; by default 0.25, for an imported arm scaled by its reach."""
+    profile: str = "pretouch"
+    """Parameters of the controller, or PROFILE:GROUP.FIELD=VALUE."""
+    seconds: float = 0.0
+    """Duration [s]; 0: until it is stopped."""
+    approach: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """First move slowly to the start of the path."""
+    floor: float | None = None
+    """Height of the floor below the arm, base frame [m]; by default 0, level with its base, and -0.2 in simulation."""

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from pretouch.cli.options import JsonFile
-from pretouch.cli.tables import PlainTable
+from pretouch.cli.tables import show
 from pretouch.cli.warm_up import prepare
 from pretouch.cli.writing import STANDARD_OUTPUT, numbers_to
 from pretouch.page.server import ServeOptions, begun, browser_here
@@ -23,6 +23,7 @@ from pretouch.recording.compare import Comparison, DetectedContact, compare
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.verify import verify as recompute
 from pretouch.signals import ended
+from pretouch.text_table import TextTable
 from pretouch.types import Mode
 
 if TYPE_CHECKING:
@@ -68,16 +69,17 @@ class Replay:
         with numbers_to(self.json) as write:
             recorded = open_recording(self.file)
             numbers = _described(recorded)
+            what_ran = _what_ran(recorded, numbers)
             if recorded.sentence:
                 console.print(recorded.sentence, markup=False)
             if page and not self.verify and not self.json:
-                console.print(f"{_what_ran(recorded)}.", markup=False)
+                console.print(f"{what_ran}.", markup=False)
             else:
                 with _progress("Reading", len(recorded)) as advance:
                     events = _events(recorded, advance)
                 contacts, holds = _many(events["contacts"], "contact"), _many(events["holds"], "hold")
                 holding = f"held for {events['held_share']:.0%} of the time"
-                console.print(f"{_what_ran(recorded)}: {contacts}, {holds} after the start, {holding}.", markup=False)
+                console.print(f"{what_ran}: {contacts}, {holds} after the start, {holding}.", markup=False)
                 numbers |= events
             verdict = None
             if self.verify:
@@ -110,7 +112,7 @@ def _progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
         yield lambda done: bar.update(task, completed=done)
 
 
-def _described(recorded: Recorded) -> dict[str, object]:
+def _described(recorded: Recorded) -> dict[str, Any]:
     """Return the facts of a recording, for JSON."""
     stamps, run = recorded.stamps(), recorded.runs[0]
     return {
@@ -124,15 +126,13 @@ def _described(recorded: Recorded) -> dict[str, object]:
     }
 
 
-def _what_ran(recorded: Recorded) -> str:
+def _what_ran(recorded: Recorded, facts: dict[str, Any]) -> str:
     """Return a line on the run and its duration."""
-    stamps, run = recorded.stamps(), recorded.runs[0]
-    profiles = ", then ".join(run.profile.name for run in recorded.runs)
-    command = run.about.get("command")
-    what = f"{command}: " if isinstance(command, str) else ""
+    command = recorded.runs[0].about.get("command")
+    what, profiles = f"{command}: " if isinstance(command, str) else "", ", then ".join(facts["profiles"])
     return (
-        f"{what}profile {profiles} on {run.model.description.name} with {_many(len(run.skin.mounted), 'unit')},"
-        f" {stamps[-1] - stamps[0]:.1f} s, {_many(len(recorded), 'step')}"
+        f"{what}profile {profiles} on {facts['arm']} with {_many(len(facts['units']), 'unit')},"
+        f" {facts['duration_s']:.1f} s, {_many(facts['steps'], 'step')}"
     )
 
 
@@ -152,16 +152,13 @@ def _many(count: int, what: str) -> str:
 
 
 def _show(console: Console, comparison: Comparison) -> None:
-    mine, other = comparison.recorded, comparison.other
-    console.print(f"\nContacts: {mine.name} as recorded, {other.name} on the same data", style="bold", markup=False)
+    title = f"Contacts: {comparison.recorded.name} as recorded, {comparison.other.name} on the same data"
     rows = [(*_cells(a), *_cells(b), f"{b.time_s - a.time_s:+.2f}" if a and b else "") for a, b in comparison.pairs]
     header = "recorded at [s]", "force [N]", "axes", "other at [s]", "force [N]", "axes", "later by [s]"
-    console.print(PlainTable(header, rows or [("none", "", "", "none", "", "", "")], left=()), crop=False)
+    note = "Detector only: both use the recorded motion of the arm, which another profile would have changed."
     if comparison.left_out:
-        left_out = f"{_many(comparison.left_out, 'step')} left out, without usable inputs in the recording."
-        console.print(left_out, markup=False)
-    note = "Detector only: both use the recorded motion of the arm, which another profile would have changed.\n"
-    console.print(note, style="dim", markup=False)
+        note += f" {_many(comparison.left_out, 'step')} left out, without usable inputs in the recording."
+    show(console, [TextTable(title, header, tuple(rows) or (("none", "", "", "none", "", "", ""),), note, 0)])
 
 
 def _cells(contact: DetectedContact | None) -> tuple[str, str, str]:

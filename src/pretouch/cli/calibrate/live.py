@@ -16,8 +16,7 @@ from pretouch.calibration.motion.limits import PlanLimits, PlanParams
 from pretouch.calibration.motion.plan import Plan
 from pretouch.calibration.motion.planner import approach, plan_motion
 from pretouch.cli.calibrate.recorded import CalibrateRecording, CalibrationFiles, calibrate_recorded
-from pretouch.cli.options import OptionalFile
-from pretouch.cli.run.options import A, UnitOptions
+from pretouch.cli.options import A, OptionalFile, UnitOptions
 from pretouch.cli.run.setup import heard_units
 from pretouch.cli.writing import numbers_to
 from pretouch.errors import CalibrationError, HardwareError, RecordingError, RobotError

@@ -11,8 +11,7 @@ import tyro
 
 from pretouch.arms import ArmSetup, OpenedArm, arm_class, arm_names
 from pretouch.calibration.motion.plan import Plan
-from pretouch.cli.options import JsonFile, OptionalFile, split_arm
-from pretouch.cli.run.options import A, RobotOptions, SkinOptions, TaskOptions
+from pretouch.cli.options import A, JsonFile, OptionalFile, RobotOptions, SkinOptions, TaskOptions, split_arm
 from pretouch.cli.run.setup import free_motion, heard_units, run_setup
 from pretouch.cli.warm_up import prepare
 from pretouch.cli.writing import check_writable, numbers_to

@@ -9,7 +9,7 @@ import numpy as np
 
 from pretouch.arms import ArmOptions, OpenedArm
 from pretouch.calibration.motion.follow import standing_at
-from pretouch.cli.run.options import RobotOptions, SkinOptions, TaskOptions, UnitOptions
+from pretouch.cli.options import RobotOptions, SkinOptions, TaskOptions, UnitOptions
 from pretouch.cli.writing import check_writable
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.control.path import Circle, Path, WayPoints
