@@ -85,7 +85,6 @@ def test_a_rate_is_that_of_the_detector(capsys, tmp_path):
     ("given", "error", "words"),
     [
         ({"profiles": ("brave",)}, ParameterError, "The profile 'brave' is unknown"),
-        ({"profiles": ()}, ParameterError, "No profile is given"),
         ({"gains": (1.0, 0.0)}, ParameterError, "--gains is 1,0"),
         ({"gains": (1.0, math.inf)}, ParameterError, "--gains is 1,inf"),
         ({"rate": 10.0}, ParameterError, "The rate is 10 Hz"),

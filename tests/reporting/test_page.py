@@ -12,7 +12,7 @@ from pretouch.reporting.html import bad, number, percent, table
 from pretouch.reporting.measures import force_section, limit_section, measure
 from pretouch.reporting.page import page, summary
 from pretouch.reporting.record import gather
-from pretouch.reporting.setting import parameter_section, setting_section
+from pretouch.reporting.setting import parameter_section
 from pretouch.sensing.skin import Skin
 from pretouch.types import Mode
 from tests.reporting import made
@@ -166,7 +166,6 @@ CUT = "The file ends in the middle of a chunk."
     ("section", "file", "said"),
     [
         (summary, {"complete": False, "sentence": CUT}, bad(CUT)),
-        (lambda m: setting_section(m.course, m.lacking), {"complete": False, "sentence": CUT}, bad(CUT)),
         (lambda m: contact_section(m.course, m.contacts), {}, "True touches are not known"),
         (lambda m: force_section(m.contacts), {}, "understates the peaks of impacts"),
         (lambda m: limit_section(m.course), {}, '<span class="bad">Exceeded: velocity of joint 1'),

@@ -64,9 +64,7 @@ class Detect(Choice):
             raise ParameterError(
                 f"--gains is {','.join(map('{:g}'.format, self.gains))}: give torques by current [Nm/A] above 0."
             )
-        profiles = None if self.profiles == AUTO else [self._profile(name) for name in self.profiles]
-        if profiles is not None and not profiles:
-            raise ParameterError("No profile is given: name one or more, separated by commas.")
+        profiles = None if self.profiles in (AUTO, ()) else [self._profile(name) for name in self.profiles]
         if self.out and self.out.suffix not in ENDINGS:
             raise RecordingError(
                 f"The figure {self.out} has an unknown format: use one of the endings {', '.join(ENDINGS)}."

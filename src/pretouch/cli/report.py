@@ -25,9 +25,6 @@ class WriteReport:
         """Write the page."""
         if not self.files:
             raise RecordingError("No recording is given: give at least one file.")
-        places = [place.resolve() for place in self.files]
-        if twice := next((place for place in places if places.count(place) > 1), None):
-            raise RecordingError(f"The recording {twice} is given more than once: give each once.")
         FIGURES.need("A report")
         check_outputs([("report", self.out)], self.files, self.replace)
         from pretouch.recording.reader import open_recording  # a help does not wait for this

@@ -32,9 +32,6 @@ from pretouch.sensing.unit import SensorUnit, TouchPatch
 from pretouch.source_digest import source_digest
 from pretouch.types import FloatArray
 
-JSON = Any
-"""Values of JSON: None, bool, numbers, text, and lists and dicts with text keys of these."""
-
 _MJCF = "arm.xml"
 _LIBRARIES = ("numpy", "numba", "mujoco-core", "scipy")
 """Those whose numbers a result rests on."""
@@ -117,7 +114,7 @@ class Run:
         """Program, libraries and machine it ran on."""
         self.started = run.started
         """Start of the run [s since 1970, UTC]."""
-        self.about: dict[str, JSON] = run.about
+        self.about: dict[str, Any] = run.about
         """Facts that the caller gave."""
         self.profile: Profile = _sound(lambda: from_table(Profile, run.profile))
 
@@ -154,7 +151,7 @@ class Run:
         return _sound(lambda: Controller(self.model, self.skin, self.fixtures, path or self.path, self.profile))
 
 
-def packed_run(controller: Controller, about: Mapping[str, JSON]) -> bytes:
+def packed_run(controller: Controller, about: Mapping[str, Any]) -> bytes:
     """Return what describes a controller. Facts that JSON cannot hold are a RecordingError."""
     model, fixtures = controller.model, controller.fixtures
     units = [
@@ -167,7 +164,7 @@ def packed_run(controller: Controller, about: Mapping[str, JSON]) -> bytes:
     return packed(_KeptRun(time.time(), versions(), facts, profile, *arm, tuple(units), *around, path))
 
 
-def _as_json(table: Mapping[str, JSON]) -> dict[str, JSON]:
+def _as_json(table: Mapping[str, Any]) -> dict[str, Any]:
     """Return facts as JSON has them; others are a RecordingError."""
     try:
         return json.loads(json.dumps(dict(table), default=_plain))

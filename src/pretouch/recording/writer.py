@@ -11,14 +11,13 @@ from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from time import monotonic
-from typing import Self
+from typing import Any, Self
 
 from pretouch.controller import Controller
 from pretouch.errors import RecordingError
 from pretouch.loop import Cycle
 from pretouch.recording.cycles import SNAPSHOT_S, Cycles, KeptCycle, inputs_of, items
 from pretouch.recording.disk import Disk, Item
-from pretouch.recording.run import JSON
 from pretouch.recording.simulation import Truth
 from pretouch.recording.viewer_topics import ViewerTopics
 from pretouch.robot.model import RobotModel
@@ -39,7 +38,7 @@ class Recording:
     RecordingError.
     """
 
-    def __init__(self, place: Path, controller: Controller, about: Mapping[str, JSON] | None = None) -> None:
+    def __init__(self, place: Path, controller: Controller, about: Mapping[str, Any] | None = None) -> None:
         """Begin a file, in a folder that exists, for the cycles of a controller.
 
         `about` has further facts on the run, as JSON; viewers draw its `scene` with `boxes`.
@@ -119,7 +118,7 @@ class LastSeconds:
         folder: Path,
         recording: Recording | None = None,
         seconds: float = 5.0,
-        about: Mapping[str, JSON] | None = None,
+        about: Mapping[str, Any] | None = None,
     ) -> None:
         """Keep the cycles of a controller.
 

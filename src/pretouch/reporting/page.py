@@ -54,7 +54,7 @@ def _recording(m: Measures) -> list[Text]:
         element("h2", m.title),
         summary(m),
         element("h3", "What ran"),
-        setting_section(course, m.lacking),
+        setting_section(course),
         element("h3", "Contacts"),
         contact_section(course, m.contacts),
         picture(force_figure(course), f"{forces} {_SHADED}"),
@@ -90,12 +90,15 @@ def _strongest(m: Measures) -> list[Html]:
 
 def summary(m: Measures) -> Html:
     """Say the most important of a recording."""
+    of_truth, peak = m.contacts.truth_known, m.contacts.peak
     shares = {mode: percent(share) for mode, (_, share) in measures.time_in_modes(m.course).items()}
     sentences: list[Text] = [
         _what(m.course),
         _contacts(m.contacts),
         _detectable(m.course),
-        _forces(m.contacts),
+        f"The largest {'true force' if of_truth else 'force estimate during a contact'} was {peak:.1f} N."
+        if peak
+        else "",
         _nearest(m.course),
         f"The arm followed its path for {shares[Mode.TRACK]} of the time, yielded for {shares[Mode.REACT]} and held for"
         f" {shares[Mode.HOLD]}.",
@@ -142,11 +145,6 @@ def _detectable(course: RunCourse) -> Text:
         f" from {most:.0f} N on 95 % of the time."
     )
     return sentence if most <= LOUD_N else bad(sentence)
-
-
-def _forces(c: ContactMeasures) -> str:
-    which = "true force" if c.truth_known else "force estimate during a contact"
-    return f"The largest {which} was {c.peak:.1f} N." if c.peak else ""
 
 
 def _nearest(course: RunCourse) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 from pretouch.composition import at, field_docs, leaves
 from pretouch.profiles import PROFILES, Profile
 from pretouch.recording.run import Run
-from pretouch.reporting.html import NOTHING, Html, Row, Text, bad, element, facts, joined, number, table, table_html
+from pretouch.reporting.html import NOTHING, Html, Row, Text, element, facts, joined, number, table, table_html
 from pretouch.reporting.record import RunCourse
 from pretouch.text_table import TextTable
 
@@ -18,11 +18,10 @@ _PROFILES = 6
 """Profiles that are shown side by side."""
 
 
-def setting_section(course: RunCourse, lacking: str) -> Html:
-    """Section on profile, time and arm of a run; `lacking` names what the file lacks, '' if it is whole."""
+def setting_section(course: RunCourse) -> Html:
+    """Section on profile, time and arm of a run."""
     first = course.runs[0]
     rows: list[tuple[Text, Text]] = [
-        ("recording", bad(lacking) if lacking else "complete"),
         ("begun", started(first)),
         ("duration", f"{course.lasted.sum():.2f} s, {len(course)} control steps"),
         ("arm", f"{first.model.description.name}, {first.model.n} joints"),
