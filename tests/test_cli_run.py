@@ -253,9 +253,7 @@ def test_ctrl_c_after_the_report_waits_until_all_is_closed(tmp_path, capsys, mon
     monkeypatch.setattr(ThreadedArm, "__exit__", interrupted)
     assert cli.main([*BLIND, "--seconds", "0.1", "--yes", "--record", "deep/er/a.mcap"]) == 130
     assert closed
-    said = capsys.readouterr().out
-    assert "The folder deep/er was created for the recording." in said
-    assert "The arm is at rest." in said
+    assert "The arm is at rest." in capsys.readouterr().out
     assert len(open_recording(tmp_path / "deep" / "er" / "a.mcap"))
     assert cli.main([*BLIND, "--seconds", "-1"]) == 2
 

@@ -85,18 +85,6 @@ def test_a_soft_goal_inside_the_arm_pushes_as_its_spring(plant_with_hand):
     assert plant.true_force[2] == pytest.approx(2000.0 * depth, rel=0.03)
 
 
-def test_a_hand_that_pushes_to_the_left_puts_a_force_to_the_left_on_the_arm(plant_with_hand):
-    # between the two capsules of the gripper's side, where the ball rests stably
-    plant = plant_with_hand((0.3069, -0.18, 0.5595))
-    Hand(plant, Script(stay((0.3069, -0.132, 0.5595)), force_max=50.0), PersonArm(speed_max=0.1))
-    before = np.mean(each_step(plant, 0.2, lambda: plant.read().wrench), axis=0)
-    plant.advance(1.0)
-    assert plant.true_force[1] > 20.0
-    assert plant.true_force == pytest.approx(plant.mj_data.qfrc_applied[-3:], abs=0.5)  # at rest
-    after = np.mean(each_step(plant, 0.3, lambda: plant.read().wrench), axis=0)
-    assert (after - before)[:3] == pytest.approx(plant.true_force, abs=1.5)
-
-
 # Touches
 
 

@@ -88,7 +88,9 @@ def _run(command: Run[Any], write: Callable[[Any], None]) -> int:
     """Move an arm, and write its numbers; return 1 if the run ended early or its recording failed, or else 0."""
     check_wishes(command.priority, command.cpu)
     if command.record:
-        _check_free(command.record)
+        if command.record.exists():
+            raise RecordingError(f"{command.record} exists already: give another file to --record.")
+        check_writable("recording", command.record)
     setup = run_setup(command.connection, command.robot, command.units, command.task)
     connection = ArmSetup(
         name=command.robot.arm,
@@ -131,16 +133,6 @@ def _run(command: Run[Any], write: Callable[[Any], None]) -> int:
             return _executed(command, standing, opened, way, learnt, notes, last, write)
         finally:
             last.enter_context(noted_in_motion())  # until arm and units are closed
-
-
-def _check_free(place: Path) -> None:
-    """Raise an error where no recording can be written; print the folder that is made for it."""
-    if place.exists():
-        raise RecordingError(f"{place} exists already: give another file to --record.")
-    missing = not place.parent.exists()
-    check_writable("recording", place)
-    if missing:
-        say(f"The folder {place.parent} was created for the recording.")
 
 
 def _checked(standing: StandingArm, notes: Sequence[str]) -> Standstill:
