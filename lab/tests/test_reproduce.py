@@ -11,7 +11,7 @@ from pretouch import cli
 from pretouch.errors import ExperimentError, SkinError
 from pretouch.sensing.skin import PAPER_SKIN
 from pretouch_lab import experiment as lab_experiment
-from pretouch_lab.cli.reproducing import whole_paper
+from pretouch_lab.cli.reproducing import compared, whole_paper
 from pretouch_lab.experiment import NAMES, arguments, controllers, experiment, play, recording_file
 from pretouch_lab.experiments import between, static
 from pretouch_lab.options import Playing, TrialOptions
@@ -50,6 +50,18 @@ def test_the_whole_paper_runs_every_experiment_and_no_trial_twice():
     assert len({where for where, _, _ in parts}) == len(parts)
     cells = [cell for _, name, options in parts if name == "static" for cell in static.cells(options)]
     assert [tuple(cell.values())[2:] for cell in cells] == [(2e3, "paper", "slack")] * 4
+
+
+def test_arms_and_skins_are_parts_of_their_own():
+    (alone,) = compared("avoidance", TrialOptions(arm="fr3"))
+    assert (alone[0], alone[2].arm) == ("", "fr3")
+    parts = compared("avoidance", TrialOptions(arm=",made/ur5e", skin=",made/skin.toml"))
+    assert [(where, own.arm, own.skin) for where, _, own in parts] == [
+        ("panda-own", "", ""),
+        ("panda-skin", "", "made/skin.toml"),
+        ("ur5e-own", "made/ur5e", ""),
+        ("ur5e-skin", "made/ur5e", "made/skin.toml"),
+    ]
 
 
 @pytest.mark.parametrize("own", [True, False])

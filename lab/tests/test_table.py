@@ -10,6 +10,7 @@ from pretouch_lab.table import (
     peak,
     rate_bounds,
     ratios,
+    share_above,
     share_below,
     short,
     spread,
@@ -58,6 +59,9 @@ def test_bounds_by_published_numbers():
     assert median_bounds([3.0, 1.0]) == (1.0, 3.0)
     assert share_below(0, 30) == pytest.approx(0.1157, abs=1e-4)
     assert (share_below(3, 3), share_below(0, 0)) == (1.0, 1.0)
+    assert share_above(59, 59) == pytest.approx(0.05 ** (1 / 59))
+    # of 60 trials with a chance of 0.95 each, 95 % have less than 60
+    assert [share_above(n, 60) > 0.95 for n in (59, 60)] == [False, True]
     assert rate_bounds(0, 3.0) == (0.0, pytest.approx(3.689 / 3.0, abs=1e-3))
     assert rate_bounds(10, 1.0) == (pytest.approx(4.795, abs=1e-3), pytest.approx(18.39, abs=1e-2))
     assert rate_bounds(10, 2.0, 2.0) == pytest.approx(rate_bounds(5, 1.0))

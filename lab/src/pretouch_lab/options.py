@@ -25,11 +25,15 @@ class TrialOptions:
     """off, hard, slack or floor, or several of them; by default off in the static experiment and slack in others."""
     stiffness: Numbers = (25000.0,)
     """Contact stiffness of the static object [N/m], or several, separated by commas."""
+    places: Words = ("beside", "inside")
+    """Where a person is in the experiment avoidance: beside, inside, the same at the line (beside line, inside line),
+    walking, nobody, nobody line, or several of them."""
     skin: str = ""
     """Skin file; by default the seven units that come with the package."""
     arm: str = ""
     """Name of an arm, or the folder of an imported one, for static, avoidance and dynamic; by default the Panda. The
-    paper's paths and places are scaled into its reach, and the skin is the arm's own."""
+    paper's paths and places are scaled into its reach, and the skin is the arm's own. --skin and --arm take several,
+    separated by commas."""
     world: str = ""
     """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file. Each trial's seed draws
     from it; by default the values are fixed."""

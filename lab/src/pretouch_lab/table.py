@@ -103,6 +103,13 @@ def share_below(events: int, of: int) -> float:
     return float(binomtest(events, of).proportion_ci(0.95, "exact").high) if of else 1.0
 
 
+def share_above(events: int, of: int) -> float:
+    """95 % lower bound, one-sided, on a share with `events` counted among `of` (Clopper and Pearson)."""
+    from scipy.stats import binomtest
+
+    return float(binomtest(events, of, alternative="greater").proportion_ci(0.95, "exact").low)
+
+
 def rate_bounds(events: float, hours: float, dispersion: float = 1.0) -> tuple[float, float]:
     """95 % bounds on a rate [1/h] with `events` counted in `hours`: exact for a Poisson count (Garwood).
 

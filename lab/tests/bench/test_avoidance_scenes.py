@@ -40,9 +40,12 @@ def test_every_scenario_can_be_set_up_and_a_person_stands_at_the_distance_it_is_
 
 def test_a_seed_gives_the_same_walker_to_everybody_and_another_seed_another():
     first, again, other = (setting(scenarios()["walking"], profile("paper"), s).setup.hand for s in (1000, 1000, 1001))
-    assert (first.speed, first.start) == (again.speed, again.start)
-    assert first.speed != other.speed
-    assert 0.8 <= first.speed <= 1.6
+    assert first.times.tolist() == again.times.tolist() != other.times.tolist()
+    start, end = first.times
+    assert 0.8 <= np.linalg.norm(first.places[1] - first.places[0]) / (end - start) <= 1.6
+    middle = first.goal((start + end) / 2, np.zeros(3), None)
+    np.testing.assert_allclose(middle.position, first.places.mean(axis=0))
+    assert middle.force_max == 400.0
 
 
 def test_friction_of_all_joints_grows_by_one_factor():

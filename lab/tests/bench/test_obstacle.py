@@ -4,21 +4,7 @@ import pytest
 
 from pretouch.perception.closest import closest_points
 from pretouch.robot.description import panda
-from pretouch_lab.bench.avoidance_scenes import Walker, travelled
 from pretouch_lab.bench.obstacle import Ball, Cuboid, least_distance, nearest
-
-
-def test_a_walker_goes_straight_brakes_to_rest_at_the_end_and_goes_slower_with_no_room_to_brake():
-    # 0.8 m/s and 4 m/s^2: 0.2 s and 0.08 m to brake, so 0.92 m in 1.15 s before
-    times = [-1.0, 0.0, 0.5, 1.15, 1.25, 1.35, 9.0]
-    expected = [0.0, 0.0, 0.4, 0.92, 0.92 + 0.08 - 0.02, 1.0, 1.0]
-    np.testing.assert_allclose([travelled(t, 1.0, 0.8) for t in times], expected, atol=1e-12)
-    # sqrt(2 * 4 * 0.02) = 0.4 m/s, which is 0.1 s to brake
-    assert travelled(0.1, 0.02, 2.0) == pytest.approx(0.02)
-    walker = Walker(np.array([0.0, -0.5, 0.6]), np.array([0.0, 0.1, 0.6]), 0.15, 1.0, 100.0)
-    goal = walker.goal(2.0, np.zeros(3), None)
-    np.testing.assert_allclose(goal.position, [0.0, -0.35, 0.6])
-    assert goal.force_max == 100.0
 
 
 def test_distances_from_a_ball_and_a_box_by_numbers():

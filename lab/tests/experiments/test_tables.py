@@ -1,5 +1,6 @@
 """The tables of the paper's three experiments, by rows by hand."""
 
+from pretouch_lab.encounters import Encounter, met
 from pretouch_lab.experiments import avoidance, dynamic, static
 from pretouch_lab.experiments.static import shown_controllers
 
@@ -72,10 +73,22 @@ def test_pushes_of_all_trials_are_pooled():
     assert table.rows == (("paper\nslack", "2/3", "70", "4.0", "30.0", "1", "2"),)
 
 
-def test_the_table_of_hands_is_by_place_and_profile():
-    row = {"place": "beside", "profile": "paper", "restrictions": "slack", "contact": False, "true_peak_n": 0.0}
-    row |= {"least_gap_m": 0.03, "deviation_m": 0.02, "least_speed_scale": 0.5, "travelled_m": 8.0}
-    rows = [row | {"false_detections": 0}, row | {"place": "inside", "contact": True, "false_detections": 1}]
-    (table,) = avoidance.tables(rows)
-    assert table.rows[0] == ("beside", "paper\nslack", "0/1", "0.0", "0.030", "0.020", "0.50", "8.00", "0")
-    assert table.rows[1][:3] == ("inside", "paper\nslack", "1/1")
+def hand_row(place, profile, seed, travelled, *touches, ghost_s=0.0):
+    row = {"place": place, "profile": profile, "restrictions": "slack", "arm": "panda", "skin": "7 vl53l1x"}
+    row |= {"contact": bool(touches), "true_peak_n": 0.0, "least_gap_m": 0.03, "deviation_m": 0.02, **met([*touches])}
+    row |= {"least_speed_scale": 0.5, "travelled_m": travelled, "false_detections": 0, "seed": seed}
+    return row | {"ghost_share": 0.004, "ghost_s": ghost_s}
+
+
+def test_the_tables_of_hands_are_by_place_and_profile_and_a_way_is_compared_with_that_of_blind():
+    touches = (0.05, 0.0, 9.0, 0.0), (0.2, 0.0, 30.0, 0.0), (0.0, 0.5, 70.0, 0.0)
+    soft, hard, by_hand = (Encounter(1, 8, *each) for each in touches)
+    rows = [hand_row("beside", "blind", 0, 10.0), hand_row("beside", "paper", 0, 9.0, ghost_s=1.5)]
+    rows += [hand_row("inside", "paper", seed, 5.0, *each) for seed, each in enumerate(([], [soft], [hard], [by_hand]))]
+    effects, hands, ghosts = avoidance.tables(rows)
+    assert effects.rows[1][2:] == ("panda\n7 vl53l1x", "0/1", "0.0", "0.030", "0.020", "0.50", "9.00", "90.0", "0")
+    # the share p of at least 3 of 4, 4 p^3 (1 - p) + p^4, is 5 % at 0.249
+    assert hands.rows[0][3:] == ("2/4", "3/4", "25", "0.125\n0.06-0.18", "19.5\n11-28", "1")
+    assert hands.rows[1][0::2] == ("all", "all\n7 vl53l1x", "3/4", "0.125\n0.06-0.18", "1")
+    assert [row[-2:] for row in ghosts.rows] == [("0.00", "0/1"), ("1.50", "1/1"), ("0.00\n0.00-0.00", "0/4")]
+    assert ghosts.rows[0][3] == "4.00"

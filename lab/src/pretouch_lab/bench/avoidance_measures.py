@@ -12,6 +12,7 @@ from pretouch.traces import mean_over
 from pretouch.types import BoolArray, ControlStep, FloatArray, Mode
 from pretouch_lab.bench.avoidance_scenes import Scenario, Setting
 from pretouch_lab.bench.obstacle import least_distance, nearest
+from pretouch_lab.encounters import hand_velocity
 from pretouch_lab.run import Row
 from pretouch_lab.table import peak, rounded
 from pretouch_lab.trial import Record
@@ -80,17 +81,9 @@ def contact(record: Record, near: BoolArray, towards: Callable[[int], FloatArray
     estimate = -record.forces() @ direction
     row["peak_estimate_n"] = rounded(peak(estimate[(times >= touch) & np.isfinite(estimate)]))
     if record.touches:
-        speed = record.touches[0].velocity - _hand_velocity(record, at)
+        speed = record.touches[0].velocity - hand_velocity(record, at)
         row["impact_speed_m_s"] = rounded(float(speed @ direction), 4)
     return row
-
-
-def _hand_velocity(record: Record, at: int) -> FloatArray:
-    """Velocity (3,) [m/s] of the person's hand before a step; zero without a hand."""
-    before = max(at - 2, 0)
-    moved = record.hand_position[at] - record.hand_position[before]
-    duration = record.steps[at].stamp - record.steps[before].stamp
-    return moved / duration if duration > 0 and np.isfinite(moved).all() else np.zeros(3)
 
 
 def clamping(time: FloatArray, force: FloatArray) -> float:

@@ -3,27 +3,26 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
-from math import sqrt
 from typing import Any
 
 import numpy as np
 
-from pretouch.control.path import Path, segment
+from pretouch.control.path import Path
 from pretouch.profiles import Profile
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin, skin_for
-from pretouch.sim.hand import HandGoal, PersonArm
+from pretouch.sim.hand import PersonArm
 from pretouch.sim.paper_scenes import Placement, placement_for, static_path, static_scene
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
-from pretouch.types import ControlStep, FloatArray
+from pretouch.types import ControlStep
 from pretouch_lab.bench.obstacle import Ball, Cuboid, ShapeAt
-from pretouch_lab.bench.scenes import SeedRange, scenario, scenario_path, seed_of
-from pretouch_lab.experiments.avoidance import Visit, Visitor
+from pretouch_lab.bench.scenes import SeedRange, held, scenario, scenario_path, seed_of
+from pretouch_lab.experiments.avoidance import Visit, Visitor, Walk
 from pretouch_lab.trial import Setup
 
 FAMILIES = ("srdo", "drdo", "person", "hand", "static", "sensing", "arm", "walking")
@@ -32,10 +31,6 @@ Table = dict[str, Any]
 PANDA = "panda"
 """The arm of the scenarios' coordinates."""
 _UNMOVED, _USUAL = Placement(), PlantParams()
-_HELD_M = 0.001
-"""Length of the path of an arm that holds its place [m]: a path needs a length."""
-_BRAKING_M_S2 = 4.0
-"""Deceleration of a walking person at the end [m/s^2]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +128,7 @@ def setting(scenario: Scenario, profile: Profile, seed: int, name: str = PANDA) 
 def path_of(params: Table, where: Placement = _UNMOVED) -> Path:
     """Return the path of a scenario at its place for an arm."""
     if params["kind"] == "held":
-        x, y, z = where.point(*params["point"])
-        return segment((x, y, z), (x, y, z + _HELD_M))
+        return held(np.array(where.point(*params["point"])))
     if "side" in params:
         return static_path(params["kind"], params["side"], where)
     return where.path("circle", -1.0)
@@ -145,29 +139,6 @@ def plant_of(params: Table, usual: PlantParams = _USUAL) -> PlantParams:
     factor = params.get("friction_factor", 1.0)
     own = {key: value for key, value in params.items() if key != "friction_factor"}
     return replace(usual, friction_f1_nm=tuple(factor * f for f in usual.friction_f1_nm), **own)
-
-
-class Walker:
-    """A hand that moves straight from one point to another and stays: a script of `pretouch.sim.hand`."""
-
-    def __init__(self, begin: FloatArray, end: FloatArray, speed: float, start: float, force_max: float) -> None:
-        """Take the points (3,) [m], the speed [m/s], the start [s] and the largest force [N]."""
-        self.speed, self.start, self._begin, self._way, self._force = speed, start, begin, end - begin, force_max
-        self._length = float(np.linalg.norm(self._way))
-
-    def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
-        """Return the position to reach at a time [s]."""
-        share = travelled(time - self.start, self._length, self.speed) / self._length
-        return HandGoal(self._begin + self._way * share, self._force)
-
-
-def travelled(time: float, length: float, speed: float) -> float:
-    """Return the distance [m] after a start at full speed [m/s] at time 0 [s], with braking to rest at `length` [m]."""
-    a = _BRAKING_M_S2
-    speed = min(speed, sqrt(2 * a * length))
-    coasting = length / speed - speed / (2 * a)
-    slowing = min(max(time - coasting, 0.0), speed / a)
-    return speed * min(max(time, 0.0), coasting) + slowing * (speed - a * slowing / 2)
 
 
 def _obstacle(params: Table, seed: int, name: str) -> tuple[ShapeAt, Table]:
@@ -209,10 +180,10 @@ def _walking(obstacle: Table, seed: int, where: Placement) -> tuple[ShapeAt, Tab
     side = rng.choice([-1.0, 1.0]) if obstacle.get("both_sides") else 1.0
     begin, end = (np.array(where.moved(*obstacle[key])) * [1.0, side, 1.0] for key in ("from", "to"))
     speed, start = rng.uniform(*obstacle["speed_m_s"]), rng.uniform(*obstacle["start_s"])
-    x, y, z = begin.tolist()
+    times, (x, y, z) = start + np.array([0.0, float(np.linalg.norm(end - begin)) / speed]), begin.tolist()
     spec = HandSpec(obstacle["radius_m"], obstacle["mass_kg"], obstacle["contact_stiffness_n_m"], (x, y, z))
     return lambda hand: Ball(hand, spec.radius), {
         "scene": SceneSpec(hand=spec),
-        "hand": Walker(begin, end, speed, start, obstacle["force_max_n"]),
+        "hand": Walk(times, np.array([begin, end]), obstacle["force_max_n"]),
         "person": PersonArm(2.0 * speed, obstacle["spring_n_m"], obstacle["damping_n_s_m"]),
     }

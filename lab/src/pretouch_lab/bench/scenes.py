@@ -149,22 +149,9 @@ def path_of(name: str) -> TaskPath:
     """Return a path by name: circle, line (to and fro), or rest."""
     if name == "line":
         return WayPoints(np.array([[0.4, 0.5, 0.5], [0.4, -0.5, 0.5]]), closed=True)
-    return Circle() if name == "circle" else Standing(Circle().point(0.0))
+    return Circle() if name == "circle" else held(Circle().point(0.0))
 
 
-@dataclass(frozen=True)
-class Standing:
-    """A path of one point: the arm stands."""
-
-    at: FloatArray
-    """(3,) [m], base frame."""
-    length: float = 0.0
-    closed: bool = False
-
-    def point(self, _phase: float) -> FloatArray:
-        """Return the point (3,) [m]."""
-        return self.at
-
-    def tangent(self, _phase: float) -> FloatArray:
-        """Return zero (3,), no direction."""
-        return np.zeros(3)
+def held(at: FloatArray) -> TaskPath:
+    """Return the path of an arm that holds a place (3,) [m]: a millimetre, as a path needs a length."""
+    return WayPoints(np.array([at, np.add(at, (0.0, 0.0, 0.001))]))

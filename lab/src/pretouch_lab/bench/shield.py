@@ -15,12 +15,13 @@ from pretouch.robot.body import Capsules
 from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.sim.hand import Hand
-from pretouch.sim.plant import TOUCH_N, Plant
+from pretouch.sim.plant import Plant
 from pretouch.text_table import TextTable
 from pretouch.types import BoolArray, ControlStep, FloatArray
 from pretouch_lab.bench.avoidance_scenes import Setting, scenarios, setting
-from pretouch_lab.bench.obstacle import Nearest, least_distance, nearest
+from pretouch_lab.bench.obstacle import least_distance, nearest
 from pretouch_lab.bench.scenes import SeedRange
+from pretouch_lab.encounters import encounters, nearest_of
 from pretouch_lab.run import Cell, Play, Row
 from pretouch_lab.table import Column, grouped, rounded, table
 from pretouch_lab.trial import Record, play
@@ -42,8 +43,8 @@ SAME_M = 0.1
 TOLERANCE = 1e-9
 """Rounding error that a joint may exceed a limit by: position [rad], velocity [rad/s], acceleration [rad/s, in a
 period]."""
-_AFTER_S, _APART_S = 1.5, 0.2
-"""Time from the first touch to the end of a trial, and longest break within one contact [s]."""
+_AFTER_S = 1.5
+"""Time from the first touch to the end of a trial [s]."""
 _TRIALS = {"pretouch": (50, 100), "paper": (6, 14), "none": (6, 14)}
 """Numbers of trials of a scene, with the commanders `tracking` and `at-person`."""
 _DRIVE_1_S = 50.0
@@ -185,20 +186,14 @@ def breaks_limits(q: FloatArray, before: FloatArray, command: FloatArray, limits
 
 
 def touches_of(record: Record, scene: Setting) -> list[Row]:
-    """Return the separate touches of a trial, each with its speed and the error of the sensed distance.
+    """Return the separate touches of a trial, each with the speed of the arm and the error of the sensed distance.
 
-    The speed is that of the touching point of the arm along the normal to the person, before the contact: the part that
-    a controller determines.
+    That speed is the part that a controller determines.
     """
-    times, rows = record.times(), []
-    pressed = record.true_time[np.linalg.norm(record.true_force, axis=1) > TOUCH_N]
-    for touch in record.touches:
-        earlier = pressed[pressed < touch.time - 1e-9]
-        at = int(np.searchsorted(times, touch.time)) - 1
-        if at >= 0 and (not len(earlier) or touch.time - earlier[-1] >= _APART_S):
-            speed = float(touch.velocity @ _near(record, scene, at, touch.link).direction)
-            rows.append({"speed_m_s": rounded(speed, 4), "mistaken_m": _mistaken(record, scene, at, touch.link)})
-    return rows
+    return [
+        {"speed_m_s": each.arm_m_s, "mistaken_m": _mistaken(record, scene, each.step, each.link)}
+        for each in encounters(record, scene.setup.model, scene.shape)
+    ]
 
 
 def _mistaken(record: Record, scene: Setting, at: int, link: int) -> float | None:
@@ -210,20 +205,13 @@ def _mistaken(record: Record, scene: Setting, at: int, link: int) -> float | Non
     rigid, worst = scene.setup.model.rigid, -np.inf
     first = int(np.searchsorted(record.times(), record.steps[at].stamp - SEEN_S))
     for i in range(first, at + 1):
-        near, o = _near(record, scene, i, link), record.steps[i].obstacles
+        near, o = nearest_of(record, scene.setup.model, scene.shape, i, link), record.steps[i].obstacles
         same = rigid[o.link] == rigid[link]
         same &= np.linalg.norm(o.body_point - near.point, axis=1) < SAME_M
         if not same.any():
             return None
         worst = max(worst, float(o.body_distance[same].min()) - near.distance)
     return rounded(worst, 4)
-
-
-def _near(record: Record, scene: Setting, at: int, link: int) -> Nearest:
-    """Return the closest points of the person and the rigid body of a link at a step."""
-    model = scene.setup.model
-    body = model.body.of_links(np.flatnonzero(model.rigid == model.rigid[link]))
-    return nearest(model.kinematics(record.steps[at].q), body, scene.shape(record.hand_position[at]))
 
 
 def results(rows: Iterable[Row]) -> list[Row]:

@@ -36,15 +36,11 @@ class Reproduce(Playing, TrialOptions):
 
     def run(self) -> None:
         """Run the experiments, and write rows, recordings, tables and figures."""
-        from pretouch_lab.cli.reproducing import reproduce, sentences, whole_paper
+        from pretouch_lab.cli.reproducing import compared, reproduce, whole_paper
         from pretouch_lab.domain_randomisation import folder_part
-        from pretouch_lab.experiment import NAMES, check
 
         options = TrialOptions(**{each.name: getattr(self, each.name) for each in fields(TrialOptions)})
-        parts = whole_paper(options) if self.experiment == "all" else [("", self.experiment, options)]
-        check(options, NAMES if self.experiment == "all" else (self.experiment,))
-        for sentence in sentences(options):
-            print(sentence)
+        parts = whole_paper(options) if self.experiment == "all" else compared(self.experiment, options)
         reproduce(parts, self.folder(f"reproduce-{self.experiment}{folder_part(self.world)}"), self)
 
 

@@ -4,7 +4,7 @@ import sys
 from dataclasses import replace
 from functools import partial
 from io import BytesIO
-from itertools import count
+from itertools import count, product
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +56,7 @@ def whole_paper(options: TrialOptions) -> list[Part]:
     A study has at most the seeds of `options`, and at most its own number. Other profiles and stiffnesses than the
     defaults replace those of the paper's three experiments; the defaults are extended by further values.
     """
+    check(options, NAMES)
     profiles = _PROFILES if options.profiles == TrialOptions.profiles else options.profiles
     stiffness = _STIFFNESS if options.stiffness == TrialOptions.stiffness else options.stiffness
     whole = replace(options, profiles=profiles)
@@ -67,19 +68,21 @@ def whole_paper(options: TrialOptions) -> list[Part]:
     return parts + [(name, name, replace(study, seeds=min(options.seeds, n))) for name, n in _STUDIES.items()]
 
 
-def sentences(options: TrialOptions) -> list[str]:
-    """Return sentences on the assumptions for another arm than the Panda."""
-    if not options.arm:
-        return []
-    context = context_of(options.arm, options.skin, options.world)
-    described = context.model.description
-    return [context.placement.sentence(described.name), assumed_plant(described)]
+def compared(name: str, options: TrialOptions) -> list[Part]:
+    """Return a part for each arm and skin of an experiment's options; several have folders of their own."""
+    pairs = [*product(options.arm.split(","), options.skin.split(","))]
+    parts = [(f"{Path(a).name or 'panda'}-{Path(s).stem or 'own'}", replace(options, arm=a, skin=s)) for a, s in pairs]
+    return [(folder if len(pairs) > 1 else "", name, each) for folder, each in parts]
 
 
 def reproduce(parts: list[Part], folder: Path, how: Playing) -> None:
     """Play the missing trials of all parts, and print and write tables and figures of all rows."""
     for _, name, options in parts:
         check(options, (name,))
+        if options.arm:
+            context = context_of(options.arm, options.skin, options.world)
+            described = context.model.description
+            print(context.placement.sentence(described.name), assumed_plant(described), sep="\n")
     plays = [experiment(name).plays(options) for _, name, options in parts]
     with numbers_to(how.json) as write:
         check_numbers(how, folder)
@@ -100,7 +103,7 @@ def _figure_of(where: str, name: str, options: TrialOptions, folder: Path, rows:
     """Draw a part's figure from the recordings of seed 0, if it has a figure and they can be read."""
     what = experiment(name)
     names = list(what.cells(options)[0])
-    if what.drawing is None or where == "restrictions":
+    if what.drawing is None or where not in ("", name):
         return []
     traces: list[tuple[Row, Any]] = []
     try:

@@ -76,13 +76,10 @@ def results(record: Record, touched: tuple[float, float] | None) -> Row:
     """Return the measures of a trial; `touched` is touch and release [s] of the push, None without contact."""
     touch, release = touched or (np.inf, np.inf)
     before = [s for s in record.steps if s.armed and s.stamp < touch]
-    lowered = [s for s in before if lowered_on_both_sides(s)]
     answer = next((s for s in record.reactions() if touch <= s.stamp <= release + _NOTICE_S), None)
-    period = float(np.median(np.diff(record.times())))
     return {
         "contact": touched is not None,
-        "both_lowered": bool(lowered),
-        "both_lowered_s": rounded(period * len(lowered)),
+        "both_lowered": any(map(lowered_on_both_sides, before)),
         "both_lowered_at_touch": lowered_on_both_sides(before[-1]) if touched and before else None,
         "detected": answer is not None,
         "detection_delay_s": None if answer is None else rounded(answer.stamp - touch, 4),

@@ -2,14 +2,12 @@
 
 from itertools import product
 
-import numpy as np
-
-from pretouch.control.path import Circle, Path, WayPoints
 from pretouch.profiles import profile
 from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.scene import SceneSpec
 from pretouch.text_table import TextTable
+from pretouch_lab.bench.scenes import path_of
 from pretouch_lab.experiment import Context, Experiment, controllers, main
 from pretouch_lab.experiments import static
 from pretouch_lab.options import TrialOptions
@@ -63,7 +61,7 @@ def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
     error = Misplacement(cell["position_mm"], cell["orientation_deg"], cell["told"] == "told")
     believed, _ = misplaced(context.skin, context.model, error, seed)
     if side == ROOM:
-        setup = context.setup(cell, seed, SceneSpec(), _way(trajectory), believed=believed)
+        setup = context.setup(cell, seed, SceneSpec(), path_of(trajectory), believed=believed)
         record = play(setup, lambda step, _: step.stamp >= _ROOM_S)
     else:
         scene = static_scene(trajectory, side, _STIFFNESS_N_PER_M, seed)
@@ -71,13 +69,6 @@ def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
         record = play(setup, static.done_after_contact())
     row = static.results(record, -1.0 if side == "+y" else 1.0, context.model.links)
     return row | {"travelled_m": rounded(record.steps[-1].path_phase) if side == ROOM else None}, record
-
-
-def _way(trajectory: str) -> Path:
-    """Return the paper's circle, or its line to and fro."""
-    if trajectory == "circle":
-        return Circle()
-    return WayPoints(np.array([(0.4, 0.5, 0.5), (0.4, -0.5, 0.5)]), closed=True)
 
 
 _ERROR = (

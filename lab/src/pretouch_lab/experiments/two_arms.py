@@ -13,13 +13,14 @@ from pretouch.controller import Controller
 from pretouch.loop import Options, turn
 from pretouch.profiles import Profile, profile
 from pretouch.robot.postures import brought_to
-from pretouch.sim.hand import Hand, HandGoal, PersonArm
+from pretouch.sim.hand import FREE_N, Hand, PersonArm
 from pretouch.sim.plant import TOUCH_N, ArmInWorld, Plant, PlantClock
 from pretouch.sim.range_finder import RangeFinders
 from pretouch.sim.scene import BasePose, HandSpec, SceneSpec, fixtures
 from pretouch.text_table import TextTable
 from pretouch.types import ControlStep, FloatArray, RobotState
 from pretouch_lab.experiment import Context, Experiment, controllers, main
+from pretouch_lab.experiments.avoidance import Walk
 from pretouch_lab.options import TrialOptions
 from pretouch_lab.run import Row
 from pretouch_lab.second_arm import SecondArm
@@ -44,31 +45,17 @@ _AIM_M = np.array([0.55, 0.0, 0.3])
 _SPREAD_M = 0.08
 _EVERY_S, _STAYS_S, _REACHING_S = 7.0, 1.5, 1.6
 """Time from one visit to the next, duration of a stay, and duration of reaching."""
-_FREE_N = 60.0
-"""Force of a person who moves the free hand [N], as in the other experiments."""
 _SPEED_M_S = 0.5
 
 
-@dataclass
-class Reaches:
-    """A person who reaches between the arms again and again, without regard to them."""
-
-    begin: float
-    """Start of the first visit [s]."""
-    aims: FloatArray
-    """(V, 3) goal of each visit [m]."""
-
-    def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
-        """Reach, stay and withdraw, each visit with its own aim."""
-        visit, since = divmod(time - self.begin, _EVERY_S)
-        inside = time >= self.begin and visit < len(self.aims) and since < _REACHING_S + _STAYS_S
-        return HandGoal(self.aims[int(visit)] if inside else _RESTS_M, _FREE_N)
-
-
-def reaches(rng: np.random.Generator, duration: float) -> Reaches:
-    """Draw the visits of a trial."""
-    count = int(duration / _EVERY_S) + 1
-    return Reaches(5.0 + 3.0 * rng.uniform(), _AIM_M + _SPREAD_M * rng.uniform(-1, 1, (count, 3)))
+def reaches(rng: np.random.Generator, duration: float) -> Walk:
+    """Draw the visits of a person who reaches between the arms again and again, without regard to them."""
+    begin, count = 5.0 + 3.0 * rng.uniform(), int(duration / _EVERY_S) + 1
+    aims, rests = _AIM_M + _SPREAD_M * rng.uniform(-1, 1, (count, 3)), np.tile(_RESTS_M, (count, 1))
+    # the goal jumps, and the person follows at `_SPEED_M_S`
+    jumps = np.repeat([0.0, _REACHING_S + _STAYS_S], 2) - [1e-6, 0.0, 1e-6, 0.0]
+    times = begin + np.add.outer(_EVERY_S * np.arange(count), jumps)
+    return Walk(times.ravel(), np.stack([rests, aims, aims, rests], axis=1).reshape(-1, 3), FREE_N)
 
 
 def way(side: float, share: float) -> WayPoints:
