@@ -33,7 +33,7 @@ from pretouch_lab.trial import Record, Setup, Trace
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-NAMES = ("static", "avoidance", "dynamic", "between", "mounting", "coverage", "two-arms")
+NAMES = ("static", "avoidance", "dynamic", "between", "mounting", "two-arms")
 """All experiments, each in a file of `experiments`, in the order of their tables."""
 _OF_THE_PAPER = ("off", "hard", "slack", "floor")
 """Restriction modes of the paper's equations. A profile with another mode keeps it."""

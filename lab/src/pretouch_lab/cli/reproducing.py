@@ -27,7 +27,7 @@ _DEMONSTRATED = ("blind", "paper", "pretouch")
 _PROFILES = (*TrialOptions.profiles, "slowing-only", "thresholds-only", "paper-0.5m")
 _STIFFNESS = (2_000.0, 25_000.0, 75_000.0, 300_000.0)
 _MODES = ("hard", "slack", "floor")
-_STUDIES = {"between": 12, "mounting": 6, "coverage": 4, "two-arms": 3}
+_STUDIES = {"between": 12, "mounting": 6, "two-arms": 3}
 """Studies beside the paper's experiments, each with its number of seeds."""
 _ENDINGS = (".png", ".pdf", ".svg")
 Part = tuple[str, str, TrialOptions]
