@@ -62,31 +62,57 @@ def test_separate_touches_have_the_speeds_before_them_and_the_force_until_the_ha
     assert encounters(record, model, lambda place: Ball(place, 0.1))[1].peak_n == 40.0
 
 
-def step(i, phase, slows):
-    """One of 100 a second; an obstacle at the origin may stand in the way."""
+def ahead(skin, away):
+    """Return the point on the axis of the first unit, at a distance [m]."""
+    kin, T = arm().kinematics(READY), skin.T_link_sensor[0]
+    return kin.position[skin.link[0]] + kin.rotation[skin.link[0]] @ (T[:3, 3] + away * T[:3, 2])
+
+
+def course(place, slows, distance=np.nan):
+    """Steps at 100 Hz: one second free, two at a fifth of 0.3 m/s, one free; an obstacle slows in some of them."""
+    phases = np.cumsum(np.where((np.arange(400) < 100) | (np.arange(400) >= 300), 0.003, 0.0006))
     near = no_obstacles(1)
-    near.body_distance[0] = 0.02
-    answer = SimpleNamespace(multipliers=np.append(np.zeros(7), float(slows)), slack=np.zeros(1), violated=False)
+    near.point[0], near.body_distance[0] = place, 0.02
     usual = {"mode": Mode.TRACK, "event": Event.CLEAR, "q": READY, "restricted": np.array([0]), "speed_scale": 1.0}
-    usual |= {"desired_velocity": np.array([0.3, 0.0, 0.0]), "ee_velocity": np.zeros(3)}
-    return SimpleNamespace(stamp=0.01 * i, path_phase=phase, obstacles=near, qp=answer, **usual)
+    usual |= {"desired_velocity": np.array([0.3, 0.0, 0.0]), "ee_velocity": np.zeros(3), "obstacles": near}
+    usual["range_distance"] = np.full(7, distance)
+    answers = [
+        SimpleNamespace(multipliers=np.append(np.zeros(7), slow), slack=np.zeros(1), violated=False)
+        for slow in (0.0, 1.0)
+    ]
+    return [
+        SimpleNamespace(stamp=0.01 * i, path_phase=phase, qp=answers[i in slows], **usual)
+        for i, phase in enumerate(phases)
+    ]
 
 
-def test_an_obstacle_with_nothing_near_it_is_a_ghost_and_holds_the_arm_as_long_as_it_is_slow():
-    # free for 1 s; an obstacle slows the arm to a fifth for 2 s, one step apart; the person is there in the first
-    phases = np.cumsum(np.select([np.arange(400) < 100, np.arange(400) < 300], [0.003, 0.0006], 0.003))
-    steps = [step(i, phase, 100 <= i < 300 and i != 250) for i, phase in enumerate(phases)]
-    hand = np.array([[0.19 if i < 200 else 1.0, 0.0, 0.0] for i in range(400)])
-    record = Record(steps, np.zeros(0), np.zeros((0, 3)), [], hand)
-    assert ghosts(record, 0.05, 0.3) == {"ghost_share": 99 / 400, "ghost_s": pytest.approx(1.0, abs=0.011)}
-    assert ghosts(record, 0.05, 0.1)["ghost_s"] == 0.0, "it is as fast as it should be"
-    alone = Record(steps, np.zeros(0), np.zeros((0, 3)), [], np.full((400, 3), np.nan))
-    assert ghosts(alone, 0.05, 0.3)["ghost_share"] == 199 / 400
+def told(steps, hand, skin, speed=0.3):
+    record = Record(steps, np.zeros(0), np.zeros((0, 3)), [], np.array(hand))
+    return tuple(ghosts(record, arm(), skin, 0.05, speed).values())
 
 
-def test_after_a_contact_the_arm_waits_for_obstacles_that_are_seen_near_it():
-    steps = [step(i, 0.0, False) for i in range(100)]
-    for each in steps[50:]:
+def test_an_obstacle_with_nothing_near_it_is_a_ghost_and_holds_the_arm_as_long_as_it_is_slow(paper_skin):
+    place, nobody = ahead(paper_skin, 0.3), np.full((400, 3), np.nan)
+    steps = course(place, [i for i in range(100, 300) if i != 250])
+    # 14 cm from the fist until 2 s, then the person is gone
+    hand = [np.add(place, (0.19 if i < 200 else 1.0, 0.0, 0.0)) for i in range(400)]
+    assert told(steps, hand, paper_skin)[:2] == (99 / 400, pytest.approx(1.0, abs=0.011))
+    assert told(steps, hand, paper_skin, speed=0.1)[1] == 0.0, "it is as fast as it should be"
+    assert told(steps, nobody, paper_skin)[0] == 199 / 400
+
+
+def test_a_ghosts_place_is_seen_empty_after_a_tenth_of_a_second_in_view_with_nothing_nearer(paper_skin):
+    nobody, slows = np.full((400, 3), np.nan), range(100, 300)
+    seen, behind, out = (
+        told(course(ahead(paper_skin, away), slows, distance), nobody, paper_skin)
+        for away, distance in ((0.3, np.nan), (0.3, 0.2), (5.0, np.nan))
+    )
+    assert seen[1:] == (pytest.approx(2.0, abs=0.011), pytest.approx(1.9, abs=0.011))
+    assert behind[2] == out[2] == 0.0
+
+
+def test_after_a_contact_the_arm_waits_for_obstacles_that_are_seen_near_it(paper_skin):
+    steps = course(np.zeros(3), ())
+    for each in steps[100:]:
         each.mode, each.event, each.touched = Mode.REACT, Event.YIELDING, SimpleNamespace(link=[])
-    record = Record(steps, np.zeros(0), np.zeros((0, 3)), [], np.full((100, 3), np.nan))
-    assert ghosts(record, 0.05, 0.3)["ghost_share"] == 0.5
+    assert told(steps, np.full((400, 3), np.nan), paper_skin)[0] == 0.75

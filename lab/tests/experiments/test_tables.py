@@ -73,22 +73,22 @@ def test_pushes_of_all_trials_are_pooled():
     assert table.rows == (("paper\nslack", "2/3", "70", "4.0", "30.0", "1", "2"),)
 
 
-def hand_row(place, profile, seed, travelled, *touches, ghost_s=0.0):
+def hand_row(place, profile, seed, travelled, *touches, empty_s=0.0):
     row = {"place": place, "profile": profile, "restrictions": "slack", "arm": "panda", "skin": "7 vl53l1x"}
     row |= {"contact": bool(touches), "true_peak_n": 0.0, "least_gap_m": 0.03, "deviation_m": 0.02, **met([*touches])}
     row |= {"least_speed_scale": 0.5, "travelled_m": travelled, "false_detections": 0, "seed": seed}
-    return row | {"ghost_share": 0.004, "ghost_s": ghost_s}
+    return row | {"ghost_share": 0.004, "ghost_s": 2.0, "empty_s": empty_s}
 
 
 def test_the_tables_of_hands_are_by_place_and_profile_and_a_way_is_compared_with_that_of_blind():
     touches = (0.05, 0.0, 9.0, 0.0), (0.2, 0.0, 30.0, 0.0), (0.0, 0.5, 70.0, 0.0)
     soft, hard, by_hand = (Encounter(1, 8, *each) for each in touches)
-    rows = [hand_row("beside", "blind", 0, 10.0), hand_row("beside", "paper", 0, 9.0, ghost_s=1.5)]
+    rows = [hand_row("beside", "blind", 0, 10.0), hand_row("beside", "paper", 0, 9.0, empty_s=1.5)]
     rows += [hand_row("inside", "paper", seed, 5.0, *each) for seed, each in enumerate(([], [soft], [hard], [by_hand]))]
     effects, hands, ghosts = avoidance.tables(rows)
     assert effects.rows[1][2:] == ("panda\n7 vl53l1x", "0/1", "0.0", "0.030", "0.020", "0.50", "9.00", "90.0", "0")
     # the share p of at least 3 of 4, 4 p^3 (1 - p) + p^4, is 5 % at 0.249
-    assert hands.rows[0][3:] == ("2/4", "3/4", "25", "0.125\n0.06-0.18", "19.5\n11-28", "1")
-    assert hands.rows[1][0::2] == ("all", "all\n7 vl53l1x", "3/4", "0.125\n0.06-0.18", "1")
+    assert hands.rows[0][3:] == ("2/4", "3/4", "25", "0.125\n0.07-0.18", "19.5\n11-28", "1")
+    assert hands.rows[1][0::2] == ("all", "all\n7 vl53l1x", "3/4", "0.125\n0.07-0.18", "1")
     assert [row[-2:] for row in ghosts.rows] == [("0.00", "0/1"), ("1.50", "1/1"), ("0.00\n0.00-0.00", "0/4")]
     assert ghosts.rows[0][3] == "4.00"
