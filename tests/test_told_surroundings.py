@@ -43,7 +43,8 @@ def test_a_profile_that_takes_no_points_and_one_without_a_source_do_the_same_to_
 def test_an_arm_slows_before_what_only_an_outside_source_sees(panda_model, paper_skin, units):
     skin = paper_skin if units else Skin([], panda_model)
     arm, free = Arm(panda_model, skin, PRETOUCH), Arm(panda_model, skin, PRETOUCH)
-    board = arm.ee() + np.stack(np.meshgrid(*(0.04 * np.arange(-3, 4),) * 2, 0.25), axis=-1).reshape(-1, 3)[:, [0, 2, 1]]
+    grid = 0.04 * np.arange(-3, 4)
+    board = arm.ee() + np.stack(np.meshgrid(grid, grid, 0.25), axis=-1).reshape(-1, 3)[:, [0, 2, 1]]
     fastest, least = 0.0, np.inf
     for _ in range(280):
         step, ahead = arm.step(points=seen(arm.time, *board)), free.step()
