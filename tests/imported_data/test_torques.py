@@ -89,8 +89,10 @@ def test_after_a_gap_what_was_learnt_is_kept_and_nothing_is_found_in_it(tmp_path
     ("change", "words"),
     [
         ({"tau": -1.0}, "minus those that hold the arm: they have the other sign, so give --sign by-robot"),
+        ({"tau": 1000.0}, "in mNm, name the columns tau1_mNm"),
         ({"q": 180 / np.pi}, "as degrees all are within: name the columns q1_deg"),
         ({"dq": 180 / np.pi}, "so they are in degrees: name the columns dq1_deg_s"),
+        ({"dq": -1.0}, "with the other sign: reverse them"),
     ],
 )
 def test_a_wrong_sign_or_unit_is_refused_and_named(tmp_path, short, change, words):
@@ -101,10 +103,16 @@ def test_a_wrong_sign_or_unit_is_refused_and_named(tmp_path, short, change, word
     assert "\n" not in str(caught.value)
 
 
-def test_external_torques_with_gravity_are_refused(tmp_path, short):
-    file = short.raw_csv(tmp_path / "a.csv", names=("q*_rad", "dq*_rad_s", "tau_ext*_Nm"))
+def external(short, file, tau):
+    return write_csv(file, short.columns(("q*_rad", short.q), ("dq*_rad_s", short.qd), ("tau_ext*_Nm", tau)))
+
+
+def test_external_torques_with_gravity_or_in_millinewtons_are_refused(tmp_path, short):
     with pytest.raises(RecordingError, match="gravity is still in them, so name the columns tau1_Nm"):
-        read_torques(file, Choice())
+        read_torques(external(short, tmp_path / "a.csv", short.driving), Choice())
+    heavy = external(short, tmp_path / "b.csv", 1000.0 * short.tau_ext)
+    with pytest.raises(RecordingError, match="in mNm, name the columns"):
+        read_torques(heavy, Choice())
 
 
 @pytest.mark.slow

@@ -16,12 +16,13 @@ from pretouch.values import value
 _GRAVITY = np.array([0.0, 0.0, 9.81])
 _MOVING_RAD_S = 0.01
 """Speed of a joint, root mean square, from which its velocity tells something [rad/s]."""
-_UNLIKE = 0.5
-"""Correlation below which two velocities are not taken to be the same."""
+_ALIKE, _UNLIKE = 0.9, 0.5
+"""Correlation from which on, and below which, two velocities are taken to be the same, or not."""
 _FAR_BETTER = 0.25
 """Part of the squared error that another explanation may leave to be believed [1]."""
 _SAMPLES = 400
 """How many samples are looked at."""
+_THOUSAND = (300.0, 3000.0)
 GAP_S = 0.1
 """Time without a sample after which a recording begins anew [s]."""
 _LEAST_HZ = 40.0
@@ -92,13 +93,15 @@ def _check_options(place: Path, kind: str, n: int, choice: Choice) -> None:
 
 
 def _check_velocities(place: Path, true: FloatArray, qd: FloatArray) -> tuple[Note, ...]:
-    """Hold velocities (N, n) [rad/s] against those of the positions; RecordingError for degrees."""
+    """Hold velocities (N, n) [rad/s] against those of the positions; RecordingError for another unit or sign."""
     moving = np.flatnonzero(np.sqrt((true**2).mean(axis=0)) > _MOVING_RAD_S)
     if not len(moving):
         return (Note("no_motion", {}),)
     true, qd = true[:, moving], qd[:, moving]
     size, product = (true**2).sum(axis=0), (qd * true).sum(axis=0)
     alike = product / np.maximum(np.sqrt((qd**2).sum(axis=0) * size), 1e-12)
+    if (alike < -_ALIKE).all():
+        raise RecordingError(f"The velocities in {place} are those of its positions with the other sign: reverse them.")
     slope = float(np.median(product / size))
     if (alike > _UNLIKE).all() and 40.0 < slope < 80.0:
         raise RecordingError(
@@ -115,7 +118,7 @@ def _check_torques(
 ) -> None:
     """Hold torques (N, n) [Nm] against the model's: those that an arm measured, or else external ones.
 
-    RecordingError for what is of another sign, and for external torques with gravity in them.
+    RecordingError for what is of another sign or unit, and for external torques with gravity in them.
     """
     some = np.unique(np.linspace(0, len(q) - 1, _SAMPLES).astype(np.int64))
     q, qd, tau = q[some], qd[some], tau[some]
@@ -123,6 +126,13 @@ def _check_torques(
     for i, (p, v) in enumerate(zip(q, qd, strict=True)):
         load = payload * model.ee_jacobian(model.kinematics(p))[:3].T @ _GRAVITY
         expected[i] = model.mass_matrix_and_bias(p, v, np.empty(model.n))[1] + load
+    times = float(np.median(np.abs(tau).max(axis=1)) / max(np.median(np.abs(expected).max(axis=1)), 1e-9))
+    largest = float(np.median((np.abs(tau) / model.description.tau_max).max(axis=1)))
+    if largest > 2.0 and _THOUSAND[0] < (times if measured else 1000.0) < _THOUSAND[1]:
+        raise RecordingError(
+            f"The torques in {place} are {largest:.3g} times the largest that {model.description.name} can give: in"
+            " mNm, name the columns tau1_mNm or tau_ext1_mNm and so on."
+        )
     same, other = (float(((tau - sign * expected) ** 2).sum()) for sign in (1.0, -1.0))
     if measured and other < _FAR_BETTER * same:
         raise RecordingError(
