@@ -14,7 +14,7 @@ from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.scene import SceneSpec, fixtures
 
 ROOM = fixtures(SceneSpec())
-PARAMS = CoverageParams()
+PARAMS = CoverageParams().standing()
 
 
 @pytest.fixture(scope="module")
@@ -78,11 +78,19 @@ def test_a_unit_at_the_hands_side_sees_what_that_side_meets(panda_model, surface
 
 def test_a_skin_is_measured_along_its_path_or_in_any_direction(panda_model, paper_skin):
     for workspace in ("circle", "joints"):
-        setting = CoverageSetting(panda_model, ROOM, PARAMS, workspace, 6, 3)
-        met = setting.met()
+        setting = CoverageSetting(panda_model, ROOM, CoverageParams(), workspace, 6, 3)
+        _, met, _ = setting.draw()
         tip = np.flatnonzero(panda_model.moved_by.all(axis=1)[met.surface.link])
         fast = met.way[:, tip][met.free[:, tip]]
         assert np.all(np.abs(fast[:, 0]) < 0.02) == (workspace == "circle"), "the circle lies across x"
-        one, other = (covered(found, seen_by(found, paper_skin)) for found in (met, setting.met()))
+        one, other = (covered(found, seen_by(found, paper_skin)) for found in (met, setting.draw()[1]))
         assert one.links == other.links
         assert 0.0 < one.arm.ways < 0.6
+
+
+def test_all_axes_of_the_hand_count_alike(panda_model, surface, hand):
+    *_, ways = CoverageSetting(panda_model, ROOM, CoverageParams(), "line", 2, 3).draw()
+    np.testing.assert_allclose(ways.share.sum(axis=1), 1 / 12)
+    assert not ways.share[:, ~hand].any()
+    axis = ways.postures[0].rotation[panda_model.ee][:, 2]
+    np.testing.assert_allclose(ways.way[2, hand & ways.free[2]] @ axis, 1.0, atol=1e-3)

@@ -33,17 +33,15 @@ def ways_all_over(model, q, each, spacing):
 
 
 @given(st.integers(0, 10_000), st.integers(1, 4))
-def test_a_greedy_choice_is_near_the_best(seed, count):
+def test_a_greedy_choice_of_one_in_each_group_is_near_the_best(seed, count):
     rng = np.random.default_rng(seed)
-    sees, weight = rng.uniform(size=(7, 30)) < 0.3, rng.uniform(size=30)
-    order, gains, left = greedy(sees, weight, count)
-    assert len(set(order)) == len(order)
-    assert len(order) == count or sum(gains) == pytest.approx(weight[sees.any(axis=0)].sum())
+    sees, weight, group = rng.uniform(size=(7, 30)) < 0.3, rng.uniform(size=30), rng.integers(0, 5, 7)
+    order, gains = zip(*greedy(sees, weight, count, group), strict=True)
+    assert len(set(group[list(order)])) == len(order) <= count
     assert all(a >= b - 1e-12 for a, b in pairwise(gains))
-    assert sum(gains) == pytest.approx(weight[sees[order].any(axis=0)].sum())
-    best = max(weight[sees[list(some)].any(axis=0)].sum() for some in combinations(range(7), count))
-    assert (1 - 1 / np.e) * best <= sum(gains) + 1e-12
-    assert best <= sum(gains) + left + 1e-12
+    assert sum(gains) == pytest.approx(weight[sees[list(order)].any(axis=0)].sum())
+    sets = [list(some) for some in combinations(range(7), len(order)) if len(set(group[list(some)])) == len(order)]
+    assert 0.5 * max(weight[sees[some].any(axis=0)].sum() for some in sets) <= sum(gains) + 1e-12
 
 
 def test_gains_fall_and_add_up_to_what_the_larger_skin_sees_of_what_comes_and_is_met(made, panda_model, paper_skin):
@@ -51,36 +49,39 @@ def test_gains_fall_and_add_up_to_what_the_larger_skin_sees_of_what_comes_and_is
     met = ways_met(panda_model, made.room, made.params, q, np.array([[0.0, 1.0, 0.0]]))
     for ways in ((made,), (made, met)):
         found = suggest(ways, paper_skin, 4)
-        gains = [one.gain for one in found.chosen]
+        gains = [one.gain for one in found]
         assert gains == sorted(gains, reverse=True)
         assert gains[-1] > 0
-        assert sum(gains) <= found.most
-        more = Skin((*paper_skin.units, *found.units), panda_model)
+        more = Skin((*paper_skin.units, *(one.unit for one in found)), panda_model)
         seen = np.array([[covered(w, seen_by(w, worn)).arm.ways for w in ways] for worn in (paper_skin, more)])
         assert sum(gains) == pytest.approx((seen[1] - seen[0]).mean(), rel=1e-6)
 
 
-def test_places_sit_on_the_surface_and_look_off_the_arm(made, panda_model, paper_skin):
-    places = candidates(made, paper_skin)
+def test_places_sit_on_the_surface_and_look_off_the_arm_and_at_the_hand_along_it(made, panda_model, paper_skin):
+    places, spots = candidates(made, paper_skin), list[tuple[float, ...]]()
     assert len(places) > 50
     for unit in places:
         link, (beam, place) = panda_model.link_index(unit.link), unit.T_link_sensor[:3, 2:].T
         assert 0 < seat(panda_model, link, place).height <= HEIGHT_M + 2e-5  # another capsule may be a little nearer
-        assert seat(panda_model, link, place - HEIGHT_M * beam).height == pytest.approx(0.0, abs=2e-5)
+        if panda_model.moved_by[link].all():
+            spots.append(tuple(place))
+        else:
+            assert seat(panda_model, link, place - HEIGHT_M * beam).height == pytest.approx(0.0, abs=2e-5)
         for other in paper_skin.units:
             apart = np.linalg.norm(other.T_link_sensor[:3, 3] - unit.T_link_sensor[:3, 3])
             assert other.link != unit.link or apart >= 0.03
+    assert len(spots) > 2 * len(set(spots)), "most have three beams"
 
 
 def test_the_file_with_new_units_keeps_the_old_ones(made, panda_model, paper_skin, tmp_path):
     found = suggest((made,), paper_skin, 2)
-    save_skin(Skin((*paper_skin.units, *found.units), panda_model), tmp_path / "more.toml")
+    save_skin(Skin((*paper_skin.units, *(one.unit for one in found)), panda_model), tmp_path / "more.toml")
     read = load_skin(tmp_path / "more.toml", panda_model)
     assert read.ids == (*paper_skin.ids, "suggested_1", "suggested_2")
     np.testing.assert_allclose(read.T_link_sensor[:7], paper_skin.T_link_sensor, atol=1e-12)
-    again = suggest((made,), read, 1)
-    assert again.chosen[0].unit.id == "suggested_3"
-    assert again.chosen[0].gain <= found.chosen[1].gain + 1e-12
+    (again,) = suggest((made,), read, 1)
+    assert again.unit.id == "suggested_3"
+    assert again.gain <= found[1].gain + 1e-12
 
 
 def test_the_back_of_a_capsule_with_a_unit_in_front(tmp_path):

@@ -49,9 +49,10 @@ def test_one_posture_is_none_of_a_workspace(panda_model):
 
 def test_the_same_seed_gives_the_same_numbers_and_the_figure_can_be_drawn(panda_model, paper_skin):
     setting = CoverageSetting(panda_model, ROOM, CoverageParams(), "circle", 4, 1000)
-    one, other, fresh = (covered(ways, seen_by(ways, paper_skin)) for ways in map(setting.ways, (0, 0, 1)))
+    sets = [setting.draw(sample)[0] for sample in (0, 0, 1)]
+    one, other, fresh = (covered(ways, seen_by(ways, paper_skin)) for ways in sets)
     assert one.links == other.links
     assert fresh.arm.ways != one.arm.ways
-    figure = coverage_figure(setting.ways(1), fresh, paper_skin, frozenset({"hand_left"}))
+    figure = coverage_figure(sets[2], fresh, paper_skin, frozenset({"hand_left"}))
     assert f"{100 * fresh.arm.ways:.0f} % of the paths" in figure.get_suptitle()
     assert len(figure.axes) == 4

@@ -15,7 +15,7 @@ from pretouch.coverage import measure
 from pretouch.coverage.blind import BLIND, blind_spots
 from pretouch.coverage.measure import CoverageSetting, covered
 from pretouch.coverage.params import CoverageParams
-from pretouch.coverage.suggest import Suggestions, candidates, suggest
+from pretouch.coverage.suggest import Suggestion, candidates, suggest
 from pretouch.coverage.ways import Ways, seen_by
 from pretouch.errors import ExperimentError, ParameterError, SkinError
 from pretouch.extras import FIGURES
@@ -98,34 +98,33 @@ class MeasureCoverage:
 
 def _measured(command: MeasureCoverage, setting: CoverageSetting, skin: Skin) -> dict[str, Any]:
     """Measure, print and draw; return the numbers."""
-    ways, standing = setting.ways(), setting.met()
-    console = Console(highlight=False)
-    sees = seen_by(ways, skin)
-    shares, new = covered(ways, sees), frozenset[str]()
-    both = shares, covered(standing, seen_by(standing, skin))
-    spots = blind_spots(ways, shares)
-    show(console, [_link_table(setting, *both), *([_unit_table(skin, ways, sees)] if len(skin) else [])])
+    sets, console = setting.draw(), Console(highlight=False)
+    masks = [seen_by(one, skin) for one in sets]
+    measures, new = [covered(one, sees) for one, sees in zip(sets, masks, strict=True)], frozenset[str]()
+    shares, sees = measures[0], masks[0]
+    spots = blind_spots(sets[0], shares)
+    show(console, [_link_table(setting, measures), *([_unit_table(skin, sets[0], sees)] if len(skin) else [])])
     total = 1e4 * sum(spot.area_m2 for spot in spots)
     lines = [f"Blind spots, with less than {100 * BLIND:g} % of the paths seen: {len(spots)}, {total:.0f} cm^2 in all."]
     lines += [f"  {spot.sentence}" for spot in spots[:_SPOTS]]
     lines += [f"  and {len(spots) - _SPOTS} smaller ones"] if len(spots) > _SPOTS else []
     console.print("\n".join(lines), markup=False, soft_wrap=True)
-    numbers = _numbers(*both) | {"blind_spots": spots}
+    numbers = _numbers(measures) | {"blind_spots": spots}
     if command.suggest:
         own = {unit.sensor.label: unit.sensor for unit in skin.mounted}
-        places = candidates(ways, skin, sensor_called(command.sensor, "--sensor", own))
-        suggested = suggest((ways, standing), skin, command.suggest, places)
-        old, skin, ways = skin, Skin((*skin.mounted, *suggested.units), setting.model), setting.ways(1)
-        new = frozenset(unit.id for unit in suggested.units)
+        places = candidates(sets[0], skin, sensor_called(command.sensor, "--sensor", own))
+        suggested = suggest(sets, skin, command.suggest, places)
+        old, skin = skin, Skin((*skin.mounted, *(one.unit for one in suggested)), setting.model)
+        new = frozenset(one.unit.id for one in suggested)
         # what the new units add, by ways that they were not chosen by
-        fresh, first = (ways, setting.met(1)), len(old.first)
-        masks = [seen_by(one, skin) for one in fresh]
-        before = [covered(one, sees[:first]) for one, sees in zip(fresh, masks, strict=True)]
-        after = [covered(one, sees) for one, sees in zip(fresh, masks, strict=True)]
+        sets, first = setting.draw(1), len(old.first)
+        masks = [seen_by(one, skin) for one in sets]
+        before = [covered(one, sees[:first]) for one, sees in zip(sets, masks, strict=True)]
+        after = [covered(one, sees) for one, sees in zip(sets, masks, strict=True)]
         shares = after[0]
-        show(console, [_suggestion_table(suggested, before, after)])
+        show(console, [_suggestion_table(suggested, len(places), before, after)])
         numbers["suggested"] = suggested
-        numbers["before"], numbers["after"] = _numbers(*before), _numbers(*after)
+        numbers["before"], numbers["after"] = _numbers(before), _numbers(after)
         if command.out:
             save_skin(skin, command.out)
             console.print(f"Skin: {command.out}", markup=False, soft_wrap=True)
@@ -133,24 +132,25 @@ def _measured(command: MeasureCoverage, setting: CoverageSetting, skin: Skin) ->
         from pretouch.coverage.figure import coverage_figure  # needs the extra
 
         with unwritable_said("figure", command.figure):
-            coverage_figure(ways, shares, skin, new).savefig(command.figure, dpi=110)
+            coverage_figure(sets[0], shares, skin, new).savefig(command.figure, dpi=110)
         console.print(f"Figure: {command.figure}", markup=False, soft_wrap=True)
     return numbers
 
 
-def _numbers(coming: measure.Coverage, standing: measure.Coverage) -> dict[str, Any]:
-    return {"links": (*coming.links, coming.arm), "met": (*standing.links, standing.arm)}
+def _numbers(measures: list[measure.Coverage]) -> dict[str, Any]:
+    return {name: (*one.links, one.arm) for name, one in zip(("links", "met", "hand"), measures, strict=True)}
 
 
-def _link_table(setting: CoverageSetting, coming: measure.Coverage, standing: measure.Coverage) -> TextTable:
+def _link_table(setting: CoverageSetting, measures: list[measure.Coverage]) -> TextTable:
     """Show the shares of each link and of the arm."""
-    p, meets = setting.params, {one.name: one.ways for one in (*standing.links, standing.arm)}
+    p, coming = setting.params, measures[0]
+    resting, close = ({one.name: f"{100 * one.ways:.1f}" for one in (*m.links, m.arm)} for m in measures[1:])
     columns = (
         ("link", lambda one: one.name),
         ("area\n[cm^2]", lambda one: f"{1e4 * one.area_m2:.0f}"),
         ("paths\n[%]", lambda one: f"{100 * one.ways:.1f}"),
-        ("surface\n[%]", lambda one: f"{100 * one.surface:.1f}"),
-        ("met\n[%]", lambda one: f"{100 * meets[one.name]:.1f}" if one.name in meets else "-"),
+        ("met\n[%]", lambda one: resting.get(one.name, "-")),
+        ("hand\n[%]", lambda one: close.get(one.name, "-")),
     )
     return tabulated(
         f"Seen in time: {setting.model.description.name}, {setting.postures} postures of {setting.workspace}",
@@ -159,8 +159,8 @@ def _link_table(setting: CoverageSetting, coming: measure.Coverage, standing: me
         f"A ball of {100 * p.object_radius_m:g} cm radius approaches a point in a straight line at"
         f" {p.object_speed_m_s:g} m/s, and the arm moves towards it at {p.arm_speed_m_s:g} m/s: it must be seen"
         f" {p.warning_m:.2f} m before contact. Paths: share of the free paths to the surface that are seen in time."
-        " Surface: points to which at least half of the paths are seen in time. Met: share of what stands in the way of"
-        f" the moving arm that is seen, {p.standing().warning_m:.2f} m before contact at the latest.",
+        f" Met: share of what stands in the way of the moving arm that is seen, {p.standing().warning_m:.2f} m before"
+        " contact at the latest. Hand: share of what the hand meets along its own axes that is seen from there on.",
         names=1,
     )
 
@@ -184,10 +184,11 @@ def _unit_table(skin: Skin, ways: Ways, sees: BoolArray) -> TextTable:
 
 
 def _suggestion_table(
-    suggested: Suggestions, before: list[measure.Coverage], after: list[measure.Coverage]
+    suggested: tuple[Suggestion, ...], places: int, before: list[measure.Coverage], after: list[measure.Coverage]
 ) -> TextTable:
     """Show the places of the new units, and the coverage before and after."""
-    was, now = ([f"{100 * one.arm.ways:.1f} %" for one in both] for both in (before, after))
+    was, now = ([f"{100 * one.arm.ways:.1f}" for one in each] for each in (before, after))
+    shares = ", ".join(f"{name} {a} to {b} %" for name, a, b in zip(("paths", "met", "hand"), was, now, strict=True))
     columns = (
         ("unit", lambda one: one.unit.id),
         ("sensor", lambda one: one.unit.sensor.label),
@@ -197,12 +198,11 @@ def _suggestion_table(
         ("gain\n[%]", lambda one: f"{100 * one.gain:.2f}"),
     )
     return tabulated(
-        f"{len(suggested.chosen)} more units: paths {was[0]} before and {now[0]} after, met {was[1]} and {now[1]}",
+        f"{len(suggested)} more units: {shares}",
         columns,
-        suggested.chosen,
-        f"Units are chosen one by one from {suggested.candidates} positions. Each adds the most to paths and met,"
-        " which have equal weight. Gains are measured on the paths used for the choice, before and after on others."
-        f" No other choice of as many units adds more than {100 * suggested.most:.1f} %.",
+        suggested,
+        f"Units are chosen one by one from {places} poses. Each adds the most to paths, met and hand, which have equal"
+        " weight. Gains are measured on the paths used for the choice, before and after on others.",
     )
 
 

@@ -3,7 +3,7 @@
 It is averaged over postures of a workspace: on the paper's paths, or in the joints' whole range.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,8 +16,6 @@ from pretouch.robot.postures import brought_to, capsule_ends, ever_apart, kinema
 from pretouch.sim.paper_scenes import placement_for
 from pretouch.types import BoolArray, FloatArray
 
-COVERED = 0.5
-"""Share of the ways to a surface point seen in time from which the point is covered."""
 _EACH = 4
 """Ways to each point of the surface in each posture."""
 KINDS = ("circle", "line", "paths", "joints")
@@ -34,8 +32,6 @@ class LinkShare:
     """Outer surface that a ball can touch [m^2]."""
     ways: float
     """Share of the ways to it on which the ball is seen in time; NaN without a free way."""
-    surface: float
-    """Share of its surface with at least half of the ways to each point seen in time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,12 +62,9 @@ def covered(ways: Ways, sees: BoolArray) -> Coverage:
     reached = free > 0
 
     def shares(name: str, points: BoolArray) -> LinkShare:
-        f, s, area = free[points], visible[points], float(surface.area[points].sum())
-        if not points.any():
-            return LinkShare(name, 0.0, float("nan"), float("nan"))
-        # the weight of a point is its area: the areas differ slightly
-        weight, good = surface.area[points] / area, s >= COVERED * f
-        return LinkShare(name, area, float((weight * s).sum() / (weight * f).sum()), float((weight * good).sum()))
+        area = surface.area[points]  # the weight of a point: the areas differ slightly
+        share = float(area @ visible[points] / (area @ free[points])) if points.any() else float("nan")
+        return LinkShare(name, float(area.sum()), share)
 
     links = (shares(names[i], (surface.link == i) & reached) for i in np.unique(surface.link[reached]))
     return Coverage(free, visible, tuple(links), shares("whole arm", reached))
@@ -88,21 +81,24 @@ class CoverageSetting:
     postures: int = 50
     seed: int = 0
 
-    def ways(self, sample: int = 0) -> Ways:
-        """Draw the ways; another `sample` has other postures and directions."""
-        rng = np.random.default_rng([self.seed, 51, sample])
-        q, _ = postures(self.model, self.room, self.workspace, self.postures, rng)
-        point = np.repeat(np.arange(len(self.model.surface.link)), _EACH)
-        return ways_to(self.model, self.room, self.params, q, point, rng)
+    def draw(self, sample: int = 0) -> tuple[Ways, Ways, Ways]:
+        """Draw ways of what comes, of what the moving arm meets, and of what its hand meets; another `sample` differs.
 
-    def met(self, sample: int = 0) -> Ways:
-        """Draw ways of the arm to objects at rest, its hand in either direction of its path, or in any direction."""
-        rng = np.random.default_rng([self.seed, 52, sample])
-        q, along = postures(self.model, self.room, self.workspace, self.postures, rng)
+        What is met is at rest. The hand moves either way on its path, or in any direction. The last are the ends of its
+        ways along each axis of the end-effector, both ways. All six have the same weight, also the one that the fingers
+        point to, where there is little surface.
+        """
+        model, room, rng = self.model, self.room, np.random.default_rng([self.seed, 51, sample])
+        q, along = postures(model, room, self.workspace, self.postures, rng)
+        ways = ways_to(model, room, self.params, q, np.repeat(np.arange(len(model.surface.link)), _EACH), rng)
         to = rng.normal(size=(self.postures, 3))
-        if along is not None:
-            to = np.sign(to[:, :1]) * along
-        return ways_met(self.model, self.room, self.params, q, to / np.linalg.norm(to, axis=1, keepdims=True))
+        to = to / np.linalg.norm(to, axis=1, keepdims=True) if along is None else np.sign(to[:, :1]) * along
+        axes = np.array([model.kinematics(row).rotation[model.ee].T for row in q])
+        axes = np.concatenate([axes, -axes], axis=1).reshape(-1, 3)
+        close = ways_met(model, room, self.params.close(), np.repeat(q, 6, axis=0), axes)
+        weight = np.where(model.rigid[close.surface.link] == model.rigid[model.ee], close.weight, 0.0)
+        weight /= np.maximum(weight @ close.surface.area, 1e-12)[:, None]
+        return ways, ways_met(model, room, self.params.standing(), q, to), replace(close, weight=weight)
 
 
 def postures(

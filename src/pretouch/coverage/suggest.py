@@ -1,7 +1,7 @@
 """Suggestion of more units: one after the other, each at the place that adds most to the coverage.
 
 The coverage of a set of units grows with each unit, by less the more there are (it is submodular). So N units chosen
-this way add at least 1 - 1/e, 63 %, of what the best N of the same places add (Nemhauser, Wolsey and Fisher 1978).
+this way, one at a place, add at least half of what the best N add (Fisher, Nemhauser and Wolsey 1978).
 """
 
 from collections.abc import Sequence
@@ -16,16 +16,17 @@ from pretouch.perception.obstacles import placed_sensors
 from pretouch.perception.scene_filter import expected_range
 from pretouch.robot.body import surface_of
 from pretouch.robot.kinematics import tangents_of
-from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import SensorUnit
-from pretouch.types import BoolArray, FloatArray
+from pretouch.sensing.unit import SensorUnit, seat
+from pretouch.types import BoolArray, FloatArray, IntArray
 
 HEIGHT_M = 0.008
 """Height of a range finder above the surface [m]."""
 _CLEAR_M = 0.4
 """Least free length of a place's beam in the ready posture [m]."""
+_ASIDE = 0.5
+"""Least sine of the angle between a normal and the hand's axis for a beam tilted along it."""
 _SPACING_M = 0.055
 """Distance between candidate places [m]; a Panda has about 300."""
 
@@ -39,43 +40,33 @@ class Suggestion:
     """Increase of the whole arm's share, after the suggestions before it."""
 
 
-@dataclass(frozen=True, eq=False)
-class Suggestions:
-    """Places for N more units, the best first."""
-
-    chosen: tuple[Suggestion, ...]
-    most: float
-    """Bound on the increase of the share by as many of these places: the smaller of (1) the increase by the chosen ones
-    over 1 - 1/e, (2) that increase and the largest gains that are left."""
-    candidates: int
-
-    @property
-    def units(self) -> tuple[SensorUnit, ...]:
-        """Suggested units."""
-        return tuple(one.unit for one in self.chosen)
-
-
 def candidates(ways: Ways, skin: Skin, sensor: Sensor = PAPER_SENSOR) -> tuple[SensorUnit, ...]:
     """Return units with a sensor all over the arm, with outward beams along the normal.
 
-    In the ready posture, the beam of the paper's sensor is free there.
+    At the hand, what moves with the end-effector, there are also beams at 45 degrees from it, along the end-effector's
+    z axis and against it. In the ready posture, the beam of the paper's sensor is free there.
     """
     model = ways.model
     kin = model.kinematics(model.description.q_ready)
     at = surface_of(model.body, model.moved_by, kin, _SPACING_M)
-    places = zip(at.link.tolist(), at.point, at.normal, strict=True)
-    units = [
-        SensorUnit(f"place {i}", model.links[link], _outward_pose(*rest)) for i, (link, *rest) in enumerate(places)
-    ]
-    units = [unit for unit in units if _fits(unit, model) and not _beside(unit, skin)]
-    beams = Skin(units, model)
-    of_no_link = placed_sensors(beams.arrays, kin)._replace(link=np.full(len(units), -1, np.int64))
-    view = expected_range(kin, of_no_link, beams.cones, model.capsules, ways.room)
+    units, hand = list[SensorUnit](), model.rigid == model.rigid[model.ee]
+    for i, (link, point, normal) in enumerate(zip(at.link.tolist(), at.point, at.normal, strict=True)):
+        axis = kin.rotation[link].T @ kin.rotation[model.ee][:, 2]
+        beams = [normal, *_tilted(normal, axis)] if hand[link] else [normal]
+        poses = [_outward_pose(point, normal, beam) for beam in beams]
+        if (below := seat(model, link, poses[0][:3, 3])) and below.height >= 0:  # not inside another capsule
+            units += [SensorUnit(f"place {i}.{k}", model.links[link], pose) for k, pose in enumerate(poses)]
+    units = [unit for unit in units if not _beside(unit, skin)]
+    worn = Skin(units, model)
+    of_no_link = placed_sensors(worn.arrays, kin)._replace(link=np.full(len(units), -1, np.int64))
+    view = expected_range(kin, of_no_link, worn.cones, model.capsules, ways.room)
     return tuple(replace(units[i], sensor=sensor) for i in np.flatnonzero(view > _CLEAR_M))
 
 
-def suggest(ways: Sequence[Ways], skin: Skin, count: int, places: tuple[SensorUnit, ...] | None = None) -> Suggestions:
-    """Choose places for `count` more units, by one or more sets of ways with equal weights.
+def suggest(
+    ways: Sequence[Ways], skin: Skin, count: int, places: tuple[SensorUnit, ...] | None = None
+) -> tuple[Suggestion, ...]:
+    """Return places for `count` more units, the best first, by one or more sets of ways with equal weights.
 
     Raises SkinError for more units than there are places.
     """
@@ -88,12 +79,11 @@ def suggest(ways: Sequence[Ways], skin: Skin, count: int, places: tuple[SensorUn
     by_skin = _visible(ways, skin).any(axis=0)
     # each place alone: together they may be more zones than a skin has
     by_place = np.concatenate([_visible(ways, Skin([place], ways[0].model)) for place in places])
-    order, gains, left = greedy(by_place, np.where(by_skin, 0.0, weight), count)
+    at = [(ways[0].model.link_index(place.link), *place.T_link_sensor[:3, 3]) for place in places]
+    spot = np.unique(at, axis=0, return_inverse=True)[1].ravel()
+    chosen = greedy(by_place, np.where(by_skin, 0.0, weight), count, spot)
     free = (name for number in count_from(1) if (name := f"suggested_{number}") not in skin.boards)
-    chosen = tuple(Suggestion(replace(places[i], id=next(free)), gain) for i, gain in zip(order, gains, strict=True))
-    added = sum(gains)
-    most = min(added + left, float(weight[~by_skin].sum()), added / (1 - 1 / np.e))
-    return Suggestions(chosen, float(most), len(places))
+    return tuple(Suggestion(replace(places[i], id=next(free)), gain) for i, gain in chosen)
 
 
 def _visible(ways: Sequence[Ways], skin: Skin) -> BoolArray:
@@ -101,39 +91,34 @@ def _visible(ways: Sequence[Ways], skin: Skin) -> BoolArray:
     return np.hstack([seen_by(some, skin).reshape(len(skin.first), some.weight.size) for some in ways])
 
 
-def greedy(sees: BoolArray, weight: FloatArray, count: int) -> tuple[list[int], list[float], float]:
+def greedy(sees: BoolArray, weight: FloatArray, count: int, group: IntArray) -> list[tuple[int, float]]:
     """Choose `count` of C sets (C, W) of weighted elements (W,), each time the set that adds most to those before.
 
-    Returns:
-        Their indices, the gain of each, and a bound on the gain of any other `count` after them. Sets without a gain
-        are not chosen.
+    At most one of each `group` (C,) is chosen, and none without a gain. Returns indices and gains.
     """
-    rest, order, gains = weight.copy(), list[int](), list[float]()
-    gain = sees @ rest
-    while len(order) < count and gain.max() > 0.0:
+    rest, free, chosen = weight.copy(), np.ones(len(sees), np.bool_), list[tuple[int, float]]()
+    while len(chosen) < count and (gain := np.where(free, sees @ rest, 0.0)).max() > 0.0:
         best = int(gain.argmax())
-        order.append(best)
-        gains.append(float(gain[best]))
+        chosen.append((best, float(gain[best])))
         rest[sees[best]] = 0.0
-        gain = sees @ rest
-    return order, gains, float(np.sort(gain)[-count:].sum())
+        free &= group != group[best]
+    return chosen
 
 
-def _outward_pose(point: FloatArray, normal: FloatArray) -> FloatArray:
-    """Return the pose (4, 4) of a unit above a surface point (3,) [m], its beam along the normal (3,); 10 um grid."""
+def _tilted(normal: FloatArray, axis: FloatArray) -> list[FloatArray]:
+    """Return unit vectors at 45 degrees from a normal (3,), along an axis (3,) and against it; none if both agree."""
+    aside = axis - (axis @ normal) * normal
+    length = float(np.linalg.norm(aside))
+    return [(normal + sign * aside / length) / np.sqrt(2.0) for sign in (1.0, -1.0)] if length > _ASIDE else []
+
+
+def _outward_pose(point: FloatArray, normal: FloatArray, beam: FloatArray) -> FloatArray:
+    """Return the pose (4, 4) of a unit above a surface point (3,) [m] with a normal (3,); 10 um grid."""
     across, T = np.empty((2, 3)), np.eye(4)
-    tangents_of(normal, across)
-    T[:3, :3] = np.column_stack([across[0], across[1], normal])
+    tangents_of(beam, across)
+    T[:3, :3] = np.column_stack([across[0], across[1], beam])
     T[:3, 3] = np.round(point + HEIGHT_M * normal, 5)
     return T
-
-
-def _fits(unit: SensorUnit, model: RobotModel) -> bool:
-    try:
-        Skin([unit], model)
-    except SkinError:
-        return False
-    return True
 
 
 def _beside(unit: SensorUnit, skin: Skin) -> bool:

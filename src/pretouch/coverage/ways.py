@@ -71,7 +71,7 @@ def ways_to(
 
 
 def ways_met(model: RobotModel, room: Fixtures, params: CoverageParams, q: FloatArray, to: FloatArray) -> Ways:
-    """Return the ways of the moving arm to objects at rest, in S postures q (S, n) [rad].
+    """Return the ways of the moving arm to objects at rest, in S postures q (S, n) [rad]; `params` are of such objects.
 
     Its hand moves in the directions `to` (S, 3) and does not turn. A surface point of velocity v and outward normal n
     collides along v with a frequency proportional to v . n, or never where that is negative.
@@ -83,7 +83,7 @@ def ways_met(model: RobotModel, room: Fixtures, params: CoverageParams, q: Float
     onto = np.einsum("swi,swi->sw", velocity, normal)
     way = np.where(speed > _STILL, velocity / np.maximum(speed, _STILL), normal)
     paths = np.arange(len(surface.link)), way, np.where(onto > _STILL, onto, 0.0)
-    return _ways(model, room, params.standing(), surface, postures, paths)
+    return _ways(model, room, params, surface, postures, paths)
 
 
 def _velocities(model: RobotModel, q: FloatArray, kin: Kinematics, to: FloatArray) -> FloatArray:
