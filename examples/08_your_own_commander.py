@@ -26,7 +26,7 @@ def resolved_rate(q: np.ndarray) -> np.ndarray:
 
 
 for name, profile in (("unprotected", "blind"), ("through pretouch", "pretouch")):
-    skin = pt.paper_skin(arm) if profile == "pretouch" else pt.Skin([], arm)
+    skin = pt.skin_for(arm) if profile == "pretouch" else pt.Skin([], arm)
     plant = pt.Plant(arm, room, pt.PlantParams(), pt.brought_to(arm, start), seed=1)
     units = pt.RangeFinders(plant, skin, pt.RangeFinderParams(), seed=1)
     shield = pt.shield(arm, skin, plant.read(), profile, pt.fixtures(room))

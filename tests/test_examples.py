@@ -34,11 +34,6 @@ def test_the_first_program_is_the_tutorials_and_does_what_the_tutorial_says(caps
     assert [mode for _, _, mode, *_ in lines if mode != "hold"][-1] == "react"
 
 
-def test_the_skin_with_zones_is_one(panda_model):
-    skin = load_skin(EXAMPLES[0].with_name("panda_zones.toml"), panda_model)
-    assert (len(skin.mounted), len(skin)) == (15, 240)
-
-
 def test_the_map_of_an_electrode_is_a_sensor_type_of_a_skin_file(panda_model, capsys, tmp_path):
     runpy.run_path(str(EXAMPLES[0].with_name("10_map_of_an_electrode.py")), run_name="__main__")
     unit = {"id": "a", "link": "panda_hand", "position_m": [0, 0, 0.2], "quaternion_wxyz": [1, 0, 0, 0]}
@@ -59,7 +54,7 @@ def test_the_readmes_program_tracks_slows_and_detects_as_it_is_written(capsys):
     lines = capsys.readouterr().out.splitlines()
     moving, slowed, touched = (
         [float(line.split()[0]) for line in lines if re.search(pattern, line)]
-        for pattern in (r"Moving at 0\.2\d m/s", r"Slowed to \d+ %: hand_left sees .* at 0\.0", "Touched at panda_hand")
+        for pattern in (r"Moving at 0\.2\d m/s", r"Slowed to \d+ %: hand_\S+ sees .* at 0\.0", "Touched at panda_hand")
     )
     assert moving
     assert slowed

@@ -25,7 +25,6 @@ from pretouch.page.room import LiveSettings
 from pretouch.page.server import ServeOptions, served
 from pretouch.page.simulation import LiveSimulation
 from pretouch.recording.reader import Recorded
-from pretouch.sensing.skin import LIVE_SKIN
 
 FROM_S, TO_S, FRAMES_PER_S = 2.2, 10.2, 10
 """Start and end of the animation in the simulation's time [s], from the first motion of the hand, and its rate."""
@@ -51,7 +50,7 @@ def record(place: Path, until: float = TO_S) -> None:
     """Record the opening, up to a time in the simulation [s]."""
     model = pt.RobotModel(pt.panda())
     settings = LiveSettings(profile=pt.profile("pretouch"))
-    simulation = LiveSimulation(settings, model, pt.skin_for(model, LIVE_SKIN))
+    simulation = LiveSimulation(settings, model, pt.skin_for(model))
     simulation.play_opening()
     simulation.start_recording(place)
     simulation.advance(until)

@@ -11,7 +11,7 @@ import pytest
 from fci.tests.conftest import RawClient, arm_of
 
 from pretouch.cli import main
-from pretouch.sensing.skin import paper_skin
+from pretouch.sensing.skin import skin_for
 from pretouch.units.keys import Keys, save_keys
 from pretouch.units.receiver import SkinReceiver
 from pretouch_fci.motion import Setpoint
@@ -47,10 +47,10 @@ def test_it_says_where_it_listens_and_ends_in_order_on_sigterm(tmp_path):
 
 
 def test_its_units_are_heard_in_real_time(tmp_path, fr3_model):
-    skin = paper_skin(fr3_model)
-    keys = Keys().with_new(skin.ids)
+    network = skin_for(fr3_model).network
+    keys = Keys().with_new(network.ids)
     save_keys(keys, tmp_path / "keys.toml")
-    with SkinReceiver(skin.ids, keys) as receiver:
+    with SkinReceiver(network, keys) as receiver:
         units = f"127.0.0.1:{receiver.address[1]}"
         words = "--units", units, "--keys", str(tmp_path / "keys.toml"), "--loss", "0.1"
         with _served("--robot", "fr3", *words) as server:

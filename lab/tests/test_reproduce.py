@@ -68,7 +68,7 @@ def test_arms_and_skins_are_parts_of_their_own():
 def test_a_changed_skin_file_is_noticed(tmp_path, monkeypatch, own):
     file, out = tmp_path / "skin.toml", tmp_path / "out"
     file.write_bytes(PAPER_SKIN.read_bytes())
-    monkeypatch.setattr(lab_experiment, "skin_file", lambda _arm: file)
+    monkeypatch.setattr(lab_experiment, "skin_file", lambda _arm, paper: file)
     options = TrialOptions(1, skin=str(file) if own else "")
     open_run(out, arguments("static", options))
     open_run(out, arguments("static", replace(options, seeds=2)))  # more of the same

@@ -8,9 +8,6 @@ from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.ways import seen_by, ways_met
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.robot.postures import brought_to
-from pretouch.sensing.sensor import VL53L7CX
-from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.scene import SceneSpec, fixtures
 
 ROOM = fixtures(SceneSpec())
@@ -61,19 +58,6 @@ def test_points_move_as_the_arm_turns(panda_model, surface):
     free = met.free[0]
     assert free.sum() > 50
     np.testing.assert_allclose(met.weight[0, free], onto[free], atol=0.02)
-
-
-@pytest.mark.parametrize(("ahead", "low", "high"), [(1.0, 0.3, 1.0), (-1.0, 0.0, 0.0)])
-def test_a_unit_at_the_hands_side_sees_what_that_side_meets(panda_model, surface, ahead, low, high):
-    """And nothing of what the other side meets."""
-    T = np.eye(4)
-    T[:3, :3] = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-    T[:3, 3] = 0.0, 0.115, 0.045
-    skin = Skin([SensorUnit("side", "panda_hand", T, sensor=VL53L7CX())], panda_model)
-    R = panda_model.kinematics(panda_model.description.q_ready).rotation[panda_model.link_index("panda_hand")]
-    met = ways_met(panda_model, ROOM, PARAMS, ready(panda_model), ahead * R[None, :, 1])
-    links = {one.name: one.ways for one in covered(met, seen_by(met, skin)).links}
-    assert low <= links["panda_hand"] <= high
 
 
 def test_a_skin_is_measured_along_its_path_or_in_any_direction(panda_model, paper_skin):

@@ -22,7 +22,7 @@ from pretouch.profiles import PROFILES, profile
 from pretouch.recording.reader import open_recording
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import LIVE_SKIN, load_skin
+from pretouch.sensing.skin import skin_for
 from pretouch.types import Mode
 
 
@@ -241,7 +241,7 @@ def test_an_opening_waits_for_somebody_and_ends_with_the_first_click(clock, simu
 @pytest.mark.slow
 def test_three_arms_with_one_hand_go_through_the_same_cycles(server, monkeypatch):
     model = RobotModel(panda())
-    simulation = LiveSimulation(LiveSettings(profile=PROFILES["pretouch"]), model, load_skin(LIVE_SKIN, model))
+    simulation = LiveSimulation(LiveSettings(profile=PROFILES["pretouch"]), model, skin_for(model))
     clock = Clock(LivePage(server, simulation))
     monkeypatch.setattr(server, "get_clients", lambda: {0: SimpleNamespace(camera=SimpleNamespace())})
     give(clock.page, "Arms", "three arms")

@@ -8,7 +8,7 @@ from pretouch.page.room import LiveSettings
 from pretouch.page.simulation import LiveSimulation
 from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import LIVE_SKIN, load_skin
+from pretouch.sensing.skin import skin_for
 from pretouch.types import ControlStep, Mode
 
 SHOWN_S = 10.0
@@ -19,7 +19,7 @@ class Played:
     """An opening from its begin to its end."""
 
     def __init__(self, model: RobotModel, name: str) -> None:
-        self.simulation = LiveSimulation(LiveSettings(profile=profile(name)), model, load_skin(LIVE_SKIN, model))
+        self.simulation = LiveSimulation(LiveSettings(profile=profile(name)), model, skin_for(model))
         self.simulation.play_opening()
         self.steps: list[ControlStep] = []
         self.force: list[float] = []

@@ -18,7 +18,7 @@ from pretouch.page.simulation import LiveSimulation
 from pretouch.profiles import profile
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import LIVE_SKIN, Skin, load_skin, skin_for
+from pretouch.sensing.skin import Skin, skin_for
 from pretouch.sensing.unit import TouchPatch
 from pretouch.sim.plant_params import plant_params_of
 from pretouch.sim.scene import HandSpec, SceneSpec
@@ -30,15 +30,6 @@ EYE = np.array([1.75, 0.95, 0.85])
 
 def test_a_panda_and_an_fr3_have_the_room_as_it_is(panda_model, fr3_model):
     assert settings_for(panda_model, LiveSettings()) == settings_for(fr3_model, LiveSettings()) == LiveSettings()
-
-
-def test_the_fr3_has_the_live_skin_of_the_panda(panda_model, fr3_model):
-    theirs, skin = load_skin(LIVE_SKIN, panda_model), load_skin(LIVE_SKIN.with_name("fr3_live.toml"), fr3_model)
-    assert skin.ids == theirs.ids
-    np.testing.assert_array_equal(skin.T_link_sensor, theirs.T_link_sensor)
-    assert [fr3_model.links[i].removeprefix("fr3") for i in skin.link] == [
-        panda_model.links[i].removeprefix("panda") for i in theirs.link
-    ]
 
 
 def test_an_unknown_arm_of_a_pandas_size_gets_a_pandas_circle(tmp_path):

@@ -1,5 +1,7 @@
 """What a sensor is expected to see of the arm and of fixtures, which is no obstacle."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ from pretouch.robot.body import Capsules
 from pretouch.robot.description import panda
 from pretouch.robot.kinematics import Kinematics
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensors, cone_rays, cones_of
-from pretouch.sensing.skin import LIVE_SKIN, load_skin
+from pretouch.sensing.skin import Skin, skin_for
 from pretouch.sim.random_skin import Misplacement, misplaced
 
 INF = np.inf
@@ -201,8 +203,8 @@ ASIDE = PerceptionParams(self_aside_m=0.005)
 def test_units_a_little_elsewhere_do_not_take_their_own_arm_for_an_obstacle(panda_model):
     rng, placed_by_hand = np.random.default_rng(5), Misplacement(5.0, 3.0)
     shown, readings = 0, 0
-    for seed in range(10):
-        truly = load_skin(LIVE_SKIN, panda_model)
+    for seed in range(15):
+        truly = Skin([replace(u, sensor=PAPER_SENSOR) for u in skin_for(panda_model).mounted], panda_model)
         believed = misplaced(truly, panda_model, placed_by_hand, seed)[0]
         watcher = Watcher(panda_model, believed, no_fixtures(), ASIDE)
         for now in range(1, 51):  # a second apart, so that nothing is remembered
@@ -215,7 +217,7 @@ def test_units_a_little_elsewhere_do_not_take_their_own_arm_for_an_obstacle(pand
             readings += len(near)
             shown += len(watcher.see(now, **near).unit)
     assert readings > 1000
-    assert shown < 10  # 46 without the allowance
+    assert shown < 20  # 30 without the allowance
 
 
 @pytest.mark.parametrize(("distance", "shown"), [(0.05, 1), (0.13, 1), (0.15, 0), (0.25, 0), (0.27, 1), (0.5, 1)])

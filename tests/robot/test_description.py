@@ -142,7 +142,7 @@ def test_a_folder_is_an_arm_and_the_skin_beside_it_is_its_skin(tmp_path: Path):
     model = RobotModel(robot_named(str(copied_panda(tmp_path))))
     (tmp_path / OWN_SKIN).unlink()
     assert model.description.mjcf.parent == tmp_path
-    assert len(skin_for(model)) == 7  # it is called panda
+    assert [len(skin_for(model, paper=paper).mounted) for paper in (True, False)] == [7, 16]  # it is called panda
     text = PAPER_SKIN.read_text()
     second = text.index("[[unit]]", text.index("[[unit]]") + 1)
     (tmp_path / OWN_SKIN).write_text(text[:second])

@@ -11,11 +11,13 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from pretouch.errors import SkinError
+from pretouch.perception.obstacles import placed_sensors
+from pretouch.perception.scene_filter import expected_range, no_fixtures
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing import skin as sensing_skin
 from pretouch.sensing.skin import Skin, load_skin, save_skin, sensor_unit
-from pretouch.sensing.unit import SensorUnit, TouchPatch
+from pretouch.sensing.unit import SensorUnit, TouchPatch, seat
 
 PRINTABLE = st.characters(codec="utf-8", exclude_categories=("C", "Z"), include_characters=" ")
 ENTRY = {
@@ -272,11 +274,25 @@ def test_a_file_that_cannot_be_read_is_named(panda_model, tmp_path):
         load_skin(tmp_path / "latin.toml", panda_model)
 
 
-def test_the_fr3_has_the_same_seven_units(paper_skin, fr3_model):
-    skin = sensing_skin.paper_skin(fr3_model)
-    assert skin.ids == paper_skin.ids
-    np.testing.assert_array_equal(skin.T_link_sensor, paper_skin.T_link_sensor)
-    assert [unit.link.replace("fr3", "panda") for unit in skin.units] == [unit.link for unit in paper_skin.units]
+@pytest.mark.parametrize("paper", [True, False])
+def test_the_fr3_has_the_same_units(panda_model, fr3_model, paper):
+    one, other = (sensing_skin.skin_for(model, paper=paper) for model in (panda_model, fr3_model))
+    assert one.ids == other.ids
+    np.testing.assert_array_equal(one.T_link_sensor, other.T_link_sensor)
+    assert [unit.link.replace("fr3", "panda") for unit in other.units] == [unit.link for unit in one.units]
+
+
+def test_units_of_the_usual_skin_are_not_buried_and_look_off_the_arm(panda_model):
+    """Each unit is off the capsules of its link, and in the ready posture few of its zones show the arm."""
+    skin = sensing_skin.skin_for(panda_model)
+    assert len(skin.mounted) <= 16
+    for unit in skin.mounted:
+        below = seat(panda_model, panda_model.link_index(unit.link), unit.T_link_sensor[:3, 3])
+        assert 0.004 < below.height < 0.025
+    kin = panda_model.kinematics(panda_model.description.q_ready)
+    of_no_link = placed_sensors(skin.arrays, kin)._replace(link=np.full(len(skin), -1))
+    own = expected_range(kin, of_no_link, skin.cones, panda_model.capsules, no_fixtures()) < 0.3
+    assert np.add.reduceat(own, skin.first, dtype=np.int64).max() <= 4
 
 
 def test_another_arm_has_no_skin_yet():

@@ -70,7 +70,7 @@ class ServeFci(FciOptions):
     keys: str = ""
     """File of the keys of the units, the same as the receiver's."""
     skin: str = ""
-    """Skin file; by default the seven units that come with the package."""
+    """Skin file; by default the sixteen units that come with the package."""
     loss: Fraction = 0.0
     """Share of the units' datagrams lost, in either direction."""
     stdin: bool = False

@@ -18,7 +18,7 @@ def table(found: Found) -> str:
     troubles = "\n".join(f"- {trouble}" for trouble in found.troubles) or "None."
     return f"""# Soak
 
-Made by `make soak`: `pretouch serve-fci` with seven units over UDP that loses {100 * LOSS:.0f} % each way, `pretouch
+Made by `make soak`: `pretouch serve-fci` with sixteen units over UDP that loses {100 * LOSS:.0f} % each way, `pretouch
 run` with a recording, and `pretouch live` with visitors, on one machine. Half of the time one run stays; then runs are
 ended at random. Wall clocks step by up to a day, and the disk of the run that stays is full for a minute.
 

@@ -23,7 +23,7 @@ from pretouch.arms.franka import identity
 from pretouch.recording.reader import open_recording
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import paper_skin
+from pretouch.sensing.skin import skin_for
 from pretouch.session.memory import ConfirmedRobots
 from pretouch.units.keys import Keys, save_keys
 
@@ -132,7 +132,7 @@ class Soak:
         self._address, self._units, self._runs = loopback(), free_port(), 0
         model = RobotModel(panda())
         self._qd_max = model.description.qd_max
-        save_keys(Keys().with_new(paper_skin(model).ids), folder / "keys.toml")
+        save_keys(Keys().with_new(skin_for(model).network.ids), folder / "keys.toml")
         ConfirmedRobots(folder / "state" / "pretouch").add(identity("panda", self._address))
         self._memory: dict[str, list[tuple[float, float]]] = {}
 

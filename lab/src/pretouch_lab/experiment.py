@@ -184,20 +184,20 @@ def check(options: TrialOptions, names: Sequence[str]) -> None:
 
 
 @lru_cache
-def context_of(arm: str, skin: str, world: str) -> Context:
-    """Load the context of all trials, once in each process."""
-    model = RobotModel(robot_named(arm or "panda"))
-    return Context(model, skin_for(model, skin), placement_for(model), world)
+def context_of(arm: str, skin: str, world: str, name: str = "paper") -> Context:
+    """Load the context of all trials with the profile of a name, once in each process."""
+    model, paper = RobotModel(robot_named(arm or "panda")), profile(name).sight.memory is None
+    return Context(model, skin_for(model, skin, paper=paper), placement_for(model), world)
 
 
 def arguments(name: str, options: TrialOptions) -> Row:
     """Return the options and the digests of their files for `run.open_run`: all that the rows depend on."""
     arm = robot_named(options.arm or "panda")
-    file = Path(options.skin or skin_file(arm))
+    files = [Path(options.skin or skin_file(arm, paper=paper)) for paper in (True, False)]
     try:
-        digests = {"skin_sha256": sha256(file.read_bytes()).hexdigest()}
+        digests = {"skin_sha256": sha256(b"".join(file.read_bytes() for file in files)).hexdigest()}
     except OSError as error:
-        raise SkinError(f"The skin file {file} cannot be read: {error.strerror}.") from error
+        raise SkinError(f"The skin file {error.filename} cannot be read: {error.strerror}.") from error
     if options.arm:
         digests["arm_sha256"] = files_digest(arm)
     if options.world:
@@ -209,7 +209,7 @@ def arguments(name: str, options: TrialOptions) -> Row:
 
 def play(name: str, options: TrialOptions, out: Path, cell: Row, seed: int) -> Row:
     """Play one trial and return its row; record it in a folder where the options ask for that."""
-    what, context = experiment(name), context_of(options.arm, options.skin, options.world)
+    what, context = experiment(name), context_of(options.arm, options.skin, options.world, cell.get("profile", "paper"))
     place = recording_file(out, cell, seed)
     unfinished = place.with_suffix(".unfinished")
     if options.record == "all" or (seed == 0 and what.drawing):

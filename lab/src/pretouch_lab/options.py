@@ -29,7 +29,7 @@ class TrialOptions:
     """Where a person is in the experiment avoidance: beside, inside, the same at the line (beside line, inside line),
     walking, nobody, nobody line, or several of them."""
     skin: str = ""
-    """Skin file; by default the seven units that come with the package."""
+    """Skin file; by default the paper's seven units, and of profiles such as pretouch the sixteen with zones."""
     arm: str = ""
     """Name of an arm, or the folder of an imported one, for static, avoidance and dynamic; by default the Panda. The
     paper's paths and places are scaled into its reach, and the skin is the arm's own. --skin and --arm take several,

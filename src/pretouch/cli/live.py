@@ -14,9 +14,9 @@ from pretouch.page.room import LiveSettings, Room, live_path, settings_for
 from pretouch.page.server import ServeOptions, browser_here, check_port
 from pretouch.page.simulation import LiveSimulation
 from pretouch.profiles import profile as find_profile
-from pretouch.robot.description import is_shipped, robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import LIVE_SKIN, Skin, skin_for
+from pretouch.sensing.skin import Skin, skin_for
 from pretouch.signals import ended
 from pretouch.sim.paper_scenes import assumptions
 from pretouch.sim.random_skin import misplaced
@@ -48,8 +48,7 @@ class Live:
     port: int = 8080
     """Port to serve the page at."""
     skin: OptionalFile = None
-    """Skin file; by default 34 units all over hand, wrist, forearm and elbow, and with --keys the seven of other
-    commands; of an imported arm the skin in its folder."""
+    """Skin file; by default sixteen units with zones, of an imported arm the skin in its folder."""
     opening: bool = True
     """True if a hand comes by itself at first, until somebody drags or clicks; never with --keys or --record."""
     units: UnitOptions = field(default_factory=UnitOptions)
@@ -66,7 +65,7 @@ class Live:
 
         model = RobotModel(robot_named(self.arm))
         settings = settings_for(model, settings)
-        believed = skin = _skin(self, model)
+        believed = skin = skin_for(model, self.skin)
         if self.world:
             world = drawn(world_set(str(self.world)), self.seed, settings.plant)
             settings = replace(settings, plant=world.plant, ranging=world.ranging)
@@ -84,13 +83,6 @@ class Live:
             if self.record:
                 simulation.start_recording(self.record)
             serve_live(simulation, options, ended, partial(print, flush=True))
-
-
-def _skin(command: Live, model: RobotModel) -> Skin:
-    """Return the skin that was asked for, or else the live page's for a Panda or FR3, or the one the arm has."""
-    arm = model.description
-    of_page = LIVE_SKIN.with_name(f"{arm.name}_live.toml") if is_shipped(arm) and not command.units.keys else ""
-    return skin_for(model, command.skin or of_page)
 
 
 @contextmanager

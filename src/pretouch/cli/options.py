@@ -94,7 +94,7 @@ class SkinOptions(UnitOptions):
     """The sensor units."""
 
     skin: OptionalFile = None
-    """Skin file; by default the seven units that come with the package."""
+    """Skin file; by default the sixteen units that come with the package, and of profiles such as paper the seven."""
     no_skin: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """The arm carries no units. The profile must not need any, such as blind."""
 

@@ -37,7 +37,7 @@ class MeasureCoverage:
     """Share of the paths to the arm on which a skin sees an object in time; blind spots; where more units help most."""
 
     skin: tyro.conf.Positional[Annotated[Path | None, tyro.conf.arg(metavar="[FILE]")]] = None
-    """Skin file; by default the seven units that come with the package, or the skin in the arm's folder."""
+    """Skin file; by default the sixteen units that come with the package, or the skin in the arm's folder."""
     arm: str = "panda"
     """panda, fr3, or the folder of an imported arm."""
     workspace: str = "paths"

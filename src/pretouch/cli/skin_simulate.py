@@ -27,7 +27,7 @@ class Simulate:
     keys: Path
     """File of the units' keys, created if it is missing. `pretouch skin monitor` needs the same file."""
     skin: OptionalFile = None
-    """Skin file; by default the seven units that come with the package."""
+    """Skin file; by default the seven units that come with the package, of profile pretouch the sixteen."""
     arm: str = "panda"
     """panda, fr3, or the folder of an imported arm."""
     host: str = HOST
@@ -59,7 +59,8 @@ class Simulate:
         down = ChannelParams(up.loss, 0.15 * up.delay_s, 0.3 * up.jitter_s, jitter_shape=2.0)
         params = FleetParams(network=NetworkParams(up, down), imu=ImuParams(), reboot_every_s=self.reboot_every)
         model, profile, end = RobotModel(robot_named(self.arm)), find_profile(self.profile), self.duration or inf
-        skin, placement = skin_for(model, self.skin), placement_for(model)
+        skin = skin_for(model, self.skin, paper=profile.sight.memory is None)
+        placement = placement_for(model)
         for sentence in assumptions(model, placement):
             say(sentence)
         keys = load_keys(self.keys) if self.keys.exists() else Keys().with_new(skin.network.ids)

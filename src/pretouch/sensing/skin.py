@@ -37,8 +37,6 @@ _MOST_UNITS = 2048
 
 PAPER_SKIN = Path(str(files("pretouch.sensing") / "data" / "panda_seven_units.toml"))
 """The file of `paper_skin` for the Panda."""
-LIVE_SKIN = PAPER_SKIN.with_name("panda_live.toml")
-"""34 units for the Panda of the live page, at the places that people touch; the FR3 has the same."""
 
 
 class SkinArrays(NamedTuple):
@@ -177,11 +175,11 @@ def paper_skin(model: RobotModel) -> Skin:
 
     The paper does not publish its layout; this one is ours, for Panda and FR3. Raises SkinError for another arm.
     """
-    return load_skin(_seven_units(model.description), model)
+    return load_skin(_shipped(model.description, "seven"), model)
 
 
-def _seven_units(arm: RobotDescription) -> Path:
-    path = PAPER_SKIN.with_name(f"{arm.name}_seven_units.toml")
+def _shipped(arm: RobotDescription, count: str) -> Path:
+    path = PAPER_SKIN.with_name(f"{arm.name}_{count}_units.toml")
     if not path.is_file():
         raise SkinError(
             f"The arm {arm.name} comes without a skin: write {OWN_SKIN} beside its model, like {PAPER_SKIN.name}, or by"
@@ -195,18 +193,18 @@ OWN_SKIN = "skin.toml"
 """A skin beside the model of an imported arm."""
 
 
-def skin_file(arm: RobotDescription) -> Path:
+def skin_file(arm: RobotDescription, *, paper: bool = False) -> Path:
     """Return the file of an arm's own skin; SkinError if there is none.
 
-    That is skin.toml beside its model, or, for Panda and FR3, that of `paper_skin`.
+    That is skin.toml beside its model, or, for Panda and FR3, sixteen units with zones, or the paper's seven.
     """
     own = arm.mjcf.with_name(OWN_SKIN)
-    return own if own.is_file() else _seven_units(arm)
+    return own if own.is_file() else _shipped(arm, "seven" if paper else "sixteen")
 
 
-def skin_for(model: RobotModel, file: Path | str | None = None) -> Skin:
-    """Return the skin of a file, or without one the arm's own skin."""
-    return load_skin(file or skin_file(model.description), model)
+def skin_for(model: RobotModel, file: Path | str | None = None, *, paper: bool = False) -> Skin:
+    """Return the skin of a file, or without one the arm's own: of `paper`, for profiles that remember no places."""
+    return load_skin(file or skin_file(model.description, paper=paper), model)
 
 
 class _UnitTable(Struct, forbid_unknown_fields=True):

@@ -115,7 +115,7 @@ def _figure_of(where: str, name: str, options: TrialOptions, folder: Path, rows:
         print(f"The figure of {where or name} does not show {file}: {error}", file=sys.stderr)
     if not traces:
         return []
-    units = context_of(options.arm, options.skin, options.world).skin.ids
+    units = context_of(options.arm, options.skin, options.world, traces[0][0]["profile"]).skin.ids
     return [(name, what.drawing.text, what.drawing.draw(traces, units))]
 
 
@@ -132,13 +132,13 @@ def draw_figure(name: str, out: Path, profile_name: str = "paper", seed: int = 0
     if out.suffix not in _ENDINGS:
         raise ExperimentError(f"The figure {out} has no known format: end its name in {', '.join(_ENDINGS)}.")
     check_writable("figure", out)
-    console, context, traces = Console(stderr=True, highlight=False, soft_wrap=True), context_of("", "", ""), []
+    console, traces = Console(stderr=True, highlight=False, soft_wrap=True), []
     for cell in drawing.cells(what.cells(TrialOptions(profiles=(*drawing.beside, profile_name)))):
         console.print(f"Playing {', '.join(map(str, cell.values()))} with seed {seed}.", markup=False)
-        record = what.trial(cell, seed, context)[1]
+        record = what.trial(cell, seed, context_of("", "", "", cell["profile"]))[1]
         if record is not None:
             traces.append((cell, trace_of(record)))
     image = BytesIO()
-    drawing.draw(traces, context.skin.ids).savefig(image, format=out.suffix[1:], dpi=150)
+    drawing.draw(traces, context_of("", "", "", profile_name).skin.ids).savefig(image, format=out.suffix[1:], dpi=150)
     with unwritable_said("figure", out):
         out.write_bytes(image.getvalue())

@@ -54,12 +54,13 @@ def touching(trace: RunRecord) -> BoolArray:
 
 
 def distances(axes: Axes, trace: RunRecord, units: tuple[str, ...]) -> None:
-    """Draw the distance that each unit reads."""
-    for k, unit in enumerate(units):
+    """Draw the distance that each unit reads, with zones the least."""
+    boards = [unit.partition("/")[0] for unit in units]
+    for k, unit in enumerate(dict.fromkeys(boards)):
         colour, line, marker = (each[k % len(each)] for each in (_COLOURS, _LINES, _MARKERS))
         marks: Look = {"marker": marker, "ms": 4, "markevery": max(1, len(trace.time) // _MARKS)}
-        distance, label = trace.range_distance[:, k], unit.replace("_", " ")
-        axes.plot(trace.time, distance, line, color=colour, lw=1.2, label=label, **marks)
+        distance = np.fmin.reduce(trace.range_distance[:, [name == unit for name in boards]], axis=1)
+        axes.plot(trace.time, distance, line, color=colour, lw=1.2, label=unit.replace("_", " "), **marks)
     axes.set_ylabel("distance read [m]")
 
 

@@ -86,7 +86,7 @@ class CalibrateArm(Generic[A]):
 
     def _moved(self, model: RobotModel, place: Path) -> bool:
         """Move the arm along the motion, and record it; return whether it ended early."""
-        skin = skin_for(model, self.files.skin)
+        skin = skin_for(model, self.files.skin, paper=True)
         setup = ArmSetup(
             name=self.files.arm,
             model=model,

@@ -85,7 +85,7 @@ def run_setup(arm: ArmOptions, robot: RobotOptions, units: SkinOptions, task: Ta
             )
         skin = Skin((), model)
     else:
-        skin = skin_for(model, units.skin)
+        skin = skin_for(model, units.skin, paper=profile.sight.memory is None)
     if arm.commanded:
         task = replace(task, path="hold")
     floor = (SceneSpec().floor_height if arm.simulated else 0.0) if task.floor is None else task.floor
