@@ -28,10 +28,10 @@ def _reading(distance, status) -> tuple[np.ndarray, np.ndarray]:
 def track(
     state: TrackState, stamps: list[float], points: np.ndarray, shows: np.ndarray, tells: np.ndarray, now: float
 ) -> TrackState:
-    """The state after readings of these stamps; what shows an obstacle has a target."""
+    """The state after readings of these stamps."""
     after, stamp = TrackState._make(part.copy() for part in state), np.array(stamps)
     flags = newer(state.reading_stamp, stamp, now), shows, tells
-    update_tracks(after, stamp, points, flags, np.where(shows, 1.0, NAN))
+    update_tracks(after, stamp, points, flags)
     return after
 
 
@@ -115,7 +115,7 @@ def test_what_is_remembered_of_a_unit_after_readings(readings, seen, used, heard
     for stamp, now, (shows, tells) in readings:
         state = _take(state, stamp, now, x=stamp, shows=shows, tells=tells)  # the point tells its stamp
     stamps = state.point_stamp, state.reading_stamp, state.report_stamp
-    assert stamps == (seen, seen, used, heard)
+    assert stamps == (seen, used, heard)
     np.testing.assert_array_equal(state.point, [[NAN] * 3 if seen == -INF else [seen, 0.0, 0.0]])
 
 
