@@ -27,7 +27,8 @@ room = pt.SceneSpec(boxes=(board,))
 # the simulated arm and its sensors; the controller knows the room's floor, but not the board
 plant = pt.Plant(arm, room, pt.PlantParams(), pt.brought_to(arm, np.array(start)), seed=1)
 sensors = pt.RangeFinders(plant, skin, pt.RangeFinderParams(), seed=1)
-controller = pt.Controller(arm, skin, pt.fixtures(room), pt.segment(start, end), pt.profile("pretouch"))
+profile = pt.profile("pretouch:approach.untouched_s=0")  # it may touch what it sees; "pretouch" waits before it
+controller = pt.Controller(arm, skin, pt.fixtures(room), pt.segment(start, end), profile)
 
 
 class Narrator:

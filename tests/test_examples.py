@@ -54,7 +54,7 @@ def test_the_readmes_program_tracks_slows_and_detects_as_it_is_written(capsys):
     lines = capsys.readouterr().out.splitlines()
     moving, slowed, touched = (
         [float(line.split()[0]) for line in lines if re.search(pattern, line)]
-        for pattern in (r"Moving at 0\.2\d m/s", r"Slowed to \d+ %: hand_\S+ sees .* at 0\.0", "Touched at panda_hand")
+        for pattern in (r"Moving at 0\.2\d m/s", r"Waiting: hand_\S+ sees .* at 0\.0", "Touched at panda_hand")
     )
     assert moving
     assert slowed

@@ -64,12 +64,12 @@ def check_shapes(step: ControlStep, n: int, units: int) -> None:
     shapes = {
         **dict.fromkeys(("q", "q_commanded", "command", "qd", "residual"), (n,)), "range_distance": (units,),
         "restricted": (rows,), "approach_limit": (rows,), "slack": (rows,), "multipliers": (n + rows,),
-        **dict.fromkeys(("unit", "link", "ee_distance", "body_distance", "closing_speed"), (k,)),
+        **dict.fromkeys(("unit", "link", "ee_distance", "body_distance", "closing_speed", "slot", "age"), (k,)),
         **dict.fromkeys(("point", "body_point", "direction"), (k, 3)),
     }  # fmt: skip
     check_touched(step.touched)
     for name, array in arrays_of(replace(step, touched=None)):
-        whole, logical = name in ("unit", "link", "restricted"), name == "axes"
+        whole, logical = name in ("unit", "link", "slot", "restricted"), name == "axes"
         assert array.dtype == (np.int64 if whole else np.bool_ if logical else np.float64), name
         assert array.shape == shapes.get(name, (3,)), name
 

@@ -103,7 +103,7 @@ def test_remembered_places_fade_and_the_units_glow_that_see_them_now(drawn, some
     now, before, long_ago = nodes["/points"].colors.astype(float)
     np.testing.assert_array_equal([now, long_ago], palette.REMEMBERED)
     np.testing.assert_allclose(before, 0.75 * now + 0.25 * long_ago, atol=0.5)
-    drawn(some_step, 0.1, places=places._replace(seen=np.full(4, some_step.stamp), unit=np.full(4, -1)))
+    drawn(some_step, 0.1, places=places._replace(stamp=np.full(4, some_step.stamp), unit=np.full(4, -1)))
     assert not np.any(nodes[UNITS].batched_colors == palette.as_vertex(palette.SEEING))
     nodes = drawn(replace(some_step, range_distance=np.full(7, 0.3)), 0.2, places=places)
     assert np.flatnonzero(nodes[CONES].batched_scales > 0.2).tolist() == [2]
