@@ -62,7 +62,6 @@ def test_a_folder_of_the_arms_own_name_is_refused_before_anything_is_fitted(tmp_
         (["--ee", "hand"], "The link 'hand' is unknown: choose from base"),
         (["--capsules", "0"], "--capsules is 0: give 1 to 10"),
         (["--package-path", "/nowhere"], "The package path /nowhere is not a folder"),
-        (["--ready", "1,2"], "--ready is [1.0, 2.0]: give 6 joint positions"),
     ],
 )
 def test_misuse_is_one_sentence(tmp_path, capsys, more, sentence):

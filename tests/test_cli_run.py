@@ -71,6 +71,7 @@ def at_begin(monkeypatch, seconds, then):
         (("--path", "circle", "--radius", "3"), "cannot reach"),
         (("--no-learnt", "--learnt", "a.toml"), "--no-learnt does not go with"),
         (("--arm", "ur5"), "There is no arm 'ur5'"),
+        ((*BLIND[1:], "--learnt", "new.toml"), "does not learn free motion"),
     ],
 )
 def test_what_does_not_fit_together_is_refused_in_a_sentence(words, said, capsys):
@@ -199,15 +200,6 @@ def test_what_was_learnt_is_kept_after_ctrl_c_in_the_file_that_was_named(tmp_pat
     assert "Free motion saved" in capsys.readouterr().out
     assert (tmp_path / "arms" / "mine.toml").exists()
     assert not (tmp_path / "state").exists()
-
-
-def test_a_named_file_of_free_motion_must_be_one_and_the_profile_must_learn(tmp_path, capsys):
-    (tmp_path / "skin.toml").write_text("[[unit]]\n")
-    assert cli.main([*LEARNING, "--learnt", "skin.toml"]) == 2
-    assert "skin.toml cannot be used as --learnt" in capsys.readouterr().err
-    assert (tmp_path / "skin.toml").read_text() == "[[unit]]\n"
-    assert cli.main([*BLIND, "--learnt", "new.toml"]) == 2
-    assert "does not learn free motion" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 
 import threading
 import time
-from contextlib import ExitStack, closing
+from contextlib import closing
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,67 +14,32 @@ from pretouch.arms.simulated.skin import VisitingHand, run
 from pretouch.control.path import Circle
 from pretouch.params import FailureParams
 from pretouch.profiles import Profile
-from pretouch.sim.imu import ImuParams
 from pretouch.sim.plant import Plant
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import RobotState
 from pretouch.units.fleet import Fleet, FleetParams, simulated_keys
-from pretouch.units.receiver import SkinReceiver
-from pretouch.units.simulated import UnitParams
-from tests.wire_skin import network
 
 NOBODY = ("127.0.0.1", 9)
 """No one listens at the discard port."""
 
 
 @pytest.fixture
-def fleet_to(paper_skin):
-    """Make the units of the paper's skin, which send to an address."""
-    with ExitStack() as stack:
-
-        def made(address: tuple[str, int], params: FleetParams | None = None) -> Fleet:
-            keys = simulated_keys(paper_skin.ids, 0)
-            return stack.enter_context(closing(Fleet(paper_skin.network, keys, params or FleetParams(), 3, address)))
-
+def fleet(paper_skin):
+    """The units of the paper's skin, which send to nobody."""
+    with closing(Fleet(paper_skin.network, simulated_keys(paper_skin.ids, 0), FleetParams(), 3, NOBODY)) as made:
         yield made
-
-
-@pytest.fixture
-def receiver(paper_skin):
-    with SkinReceiver(paper_skin.ids, simulated_keys(paper_skin.ids, 0)) as made:
-        yield made
-
-
-def test_units_that_are_silent_stuck_or_reboot_are_so_at_the_receiver(fleet_to, receiver, panda_model, paper_skin):
-    params = FleetParams(network(loss=0.05), UnitParams(boot_s=0.1), ImuParams(), reboot_every_s=2.5)
-    silent, stuck, said, over = paper_skin.ids[0], paper_skin.ids[1], [], threading.Event()
-    fleet = fleet_to(receiver.address, params)
-    fleet.set_faults({silent}, {stuck})
-    args = panda_model, paper_skin, fleet, Circle(), Profile(), False, lambda _: over.is_set(), said.append
-    other = threading.Thread(target=run, args=args)
-    other.start()
-    give_up, was_stuck = time.monotonic() + 60, False
-    try:
-        while not (was_stuck and sum(unit.reboots for unit in receiver.units) > 3):
-            assert time.monotonic() < give_up, "it never came to that"
-            assert other.is_alive()
-            receiver.receive(0.02)
-            was_stuck = was_stuck or receiver.units[1].stuck
-    finally:
-        over.set()
-        other.join()
-    assert receiver.units[0].state == "never heard"
-    assert not any(unit.stuck for unit in receiver.units[2:])
-    assert all(silent in line for line in said)
 
 
 @pytest.mark.slow
-def test_it_ends_in_order_and_says_how_it_went_each_second(fleet_to, panda_model, paper_skin):
+def test_it_ends_in_order_and_says_how_it_went_each_second(fleet, panda_model, paper_skin):
     said, begin = [], time.monotonic()
-    run(panda_model, paper_skin, fleet_to(NOBODY), Circle(), Profile(), True, lambda now: now >= 2.1, said.append)
+    fleet.set_faults(paper_skin.ids[:1], paper_skin.ids[1:2])
+    assert [(unit.silent, unit.stuck) for unit in fleet.units[:3]] == [(True, False), (False, True), (False, False)]
+    run(panda_model, paper_skin, fleet, Circle(), Profile(), True, lambda now: now >= 2.1, said.append)
     assert 2.0 < time.monotonic() - begin < 30.0
     assert len(said) == 2
-    assert all("0 of 7 units in session" in line for line in said)
+    words = f"0 of 7 units in session; without session: {', '.join(paper_skin.ids)}"
+    assert all(words in line for line in said)
 
 
 def test_the_hand_comes_and_goes():
@@ -88,8 +53,8 @@ def test_the_hand_comes_and_goes():
 
 
 @pytest.fixture
-def begun(panda_model, paper_skin, fleet_to):
-    q, fleet = panda_model.description.q_ready, fleet_to(NOBODY)
+def begun(panda_model, paper_skin, fleet):
+    q = panda_model.description.q_ready
     arm = SimulatedArm(panda_model, q, paper_skin, fleet, SceneSpec(), 0.01)
     arm.begin()
     return arm
@@ -182,7 +147,7 @@ def test_a_simulation_that_stands_still_falls_behind_until_it_goes_on(arm, simul
 
 
 def test_a_machine_that_is_always_too_slow_still_hands_out_states_that_a_controller_believes(
-    panda_model, paper_skin, fleet_to, monkeypatch
+    panda_model, paper_skin, fleet, monkeypatch
 ):
     advance = Plant.advance
 
@@ -191,7 +156,7 @@ def test_a_machine_that_is_always_too_slow_still_hands_out_states_that_a_control
         advance(plant, duration)
 
     monkeypatch.setattr(Plant, "advance", slowly)
-    with ThreadedArm(panda_model, panda_model.description.q_ready, paper_skin, fleet_to(NOBODY), SceneSpec()) as arm:
+    with ThreadedArm(panda_model, panda_model.description.q_ready, paper_skin, fleet, SceneSpec()) as arm:
         begin, ages = time.monotonic(), []
         while time.monotonic() < begin + 2.0:
             ages.append(-arm.read().stamp + time.monotonic())

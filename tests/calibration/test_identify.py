@@ -9,7 +9,7 @@ from pretouch.calibration.calibrate import calibrate
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.random_skin import random_skin
-from tests.calibration.faulty import cut, joints, kept, traced
+from tests.calibration.faulty import cut, kept, traced
 from tests.calibration.made import MovingArm
 
 
@@ -55,12 +55,6 @@ def test_a_unit_on_a_link_that_did_not_move_fits_no_link(panda_model, whole_skin
     data = arm.data(Skin(whole_skin.units[:1], panda_model))
     (finding,) = calibrate(panda_model, data).units[0].findings
     assert (whole_skin.units[0].link, finding.kind, finding.refused) == ("panda_link2", "no_link", True)
-
-
-def test_data_of_another_motion_fit_no_link(panda_model, moving_arm, good):
-    for unit in calibrate(panda_model, joints(good, q=good.joints.q[::-1])).units:
-        assert [(finding.kind, finding.refused) for finding in unit.findings] == [("no_link", True)]
-        assert unit.place is None
 
 
 @pytest.mark.slow

@@ -102,17 +102,6 @@ def test_the_ready_posture_is_a_good_one(model, imported):
     assert self_distances(model, capsule_ends(model, kinematics_of(model, q[None]))).min() > 0.0099
 
 
-def test_a_folder_that_is_there_is_refused(imported, tmp_path):
-    out = tmp_path / "arm"
-    out.mkdir()
-    with pytest.raises(RobotModelError, match="arm exists already: give another --out, or remove it"):
-        write_folder(imported, out)
-    assert list(out.iterdir()) == []
-    out.rmdir()
-    write_folder(imported, out)
-    assert sorted(p.name for p in out.iterdir()) == ["arm.xml", "robot.toml"]
-
-
 @pytest.mark.slow
 def test_a_small_arm_with_a_hand_that_turns_about_itself_gets_a_ready_posture(tmp_path):
     found = import_robot(written(tmp_path, small()), ImportOptions(capsules=1))

@@ -175,6 +175,7 @@ def test_a_named_file_that_cannot_be_used_is_refused_and_never_written_over(tmp_
     (tmp_path / "skin.toml").write_text("[[unit]]\n")
     with pytest.raises(RobotModelError, match=r"skin\.toml cannot be used as --learnt"):
         begun(ModelFile("panda at here", tmp_path / "skin.toml", True), arm)
+    assert (tmp_path / "skin.toml").read_text() == "[[unit]]\n"
 
 
 def test_a_named_file_may_be_of_another_robot_of_the_kind_but_not_of_another_kind(file, arm, fr3_model):
