@@ -30,8 +30,8 @@ def swinging(model: RobotModel, duration: float = 17.0) -> Plan:
     return Plan(np.array([0.0, 0.5, duration - 0.5, duration]), np.array([q] * 4), (swing,))
 
 
-def record_motion(model: RobotModel, skin: Skin, place: Path, joints_too: bool = True) -> JointTrace:
-    """Record units, and joints if asked for, while the arm swings; return where the joints were."""
+def record_motion(model: RobotModel, skin: Skin, place: Path) -> JointTrace:
+    """Record units and joints while the arm swings; return where the joints were."""
     plan = swinging(model)
     plant = Plant(model, SceneSpec(), PlantParams(), plan.start, 0)
     fleet = FleetParams(imu=ImuParams(misalignment_deg=0.0))
@@ -46,8 +46,7 @@ def record_motion(model: RobotModel, skin: Skin, place: Path, joints_too: bool =
                 state = cycle.inputs.robot
                 stamps.append(state.stamp)
                 positions.append(np.array(state.q))
-                if joints_too:
-                    recording.joints(np.array([state.stamp]), positions[-1][None], None, model.joints)
+                recording.joints(np.array([state.stamp]), positions[-1][None], None, model.joints)
                 recording.add(wire.receiver.take_samples(), skin.ids)
 
         clock, options = PlantClock(plant, 0.01), loop.Options(desired=commander)

@@ -39,25 +39,25 @@ def joints(stamp, q, names=PANDA, velocity=(), effort=()):
     )
 
 
-def write_bag(folder, messages, plugin=StoragePlugin.MCAP):
+def write_bag(folder, messages, plugin=StoragePlugin.MCAP, store=STORE):
     """Write messages (topic, time of recording [ns], message); return the folder."""
     with Writer(folder, version=9, storage_plugin=plugin) as writer:
-        topics = {}
-        for topic, time, message in messages:
-            if topic not in topics:
-                topics[topic] = writer.add_connection(topic, message.__msgtype__, typestore=STORE)
-            writer.write(topics[topic], int(time), STORE.serialize_cdr(message, message.__msgtype__))
+        _write(writer, messages, store, store.serialize_cdr)
     return folder
 
 
-def write_bag1(file, messages):
+def write_bag1(file, messages, store=STORE1):
     with Writer1(file) as writer:
-        topics = {}
-        for topic, time, message in messages:
-            if topic not in topics:
-                topics[topic] = writer.add_connection(topic, message.__msgtype__, typestore=STORE1)
-            writer.write(topics[topic], int(time), STORE1.serialize_ros1(message, message.__msgtype__))
+        _write(writer, messages, store, store.serialize_ros1)
     return file
+
+
+def _write(writer, messages, store, serialized):
+    topics = {}
+    for topic, time, message in messages:
+        if topic not in topics:
+            topics[topic] = writer.add_connection(topic, message.__msgtype__, typestore=store)
+        writer.write(topics[topic], int(time), serialized(message, message.__msgtype__))
 
 
 def stamps(count, rate=100.0):

@@ -165,19 +165,6 @@ def test_a_message_without_positions_is_passed_over(tmp_path, panda_model):
     assert len(trace.stamp) == 50
 
 
-def test_disorder_and_doubles_are_put_right_and_counted(tmp_path):
-    messages = wrenches(FORCE)
-    messages[3], messages[4] = messages[4], messages[3]
-    stamp = messages[10][1] - 300_000
-    messages.insert(11, ("/wrench", messages[10][1] + 1, wrench(stamp, (9, 9, 9))))
-    late = [("/wrench", START + i * 10_000_000 + 300_000, m) for i, (_, _, m) in enumerate(messages)]
-    recording = force_of(write_bag(tmp_path / "bag", late))
-    expected = FORCE.copy()
-    expected[10] = 9
-    np.testing.assert_array_equal(recording.force, expected)
-    assert [(note.code, note.values["count"]) for note in recording.notes] == [("sorted", 1), ("repeated", 1)]
-
-
 def test_without_stamps_in_the_headers_the_times_of_recording_are_used(tmp_path):
     messages = wrenches(FORCE)
     for _, _, message in messages[5:7]:

@@ -123,6 +123,7 @@ def test_positions_out_of_the_arms_range_are_refused_and_degrees_are_named(panda
         ("folder", {}, "has no metadata.yaml"),
         ("pipe.csv", {}, "is no file"),
         ("a.csv", {"wrench": "/w"}, "is a table and has no topics"),
+        ("a.csv", {"torques": "/x"}, "has no topics: leave out"),
         ("a.csv", {}, "is empty"),
         ("a.mcap", {}, "cannot be read as a bag or MCAP file"),
         ("a.parquet", {}, "cannot be read as a Parquet file"),

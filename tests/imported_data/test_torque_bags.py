@@ -2,15 +2,13 @@
 
 import numpy as np
 import pytest
-from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from pretouch.errors import RecordingError
 from pretouch.imported_data.log import Choice
 from pretouch.imported_data.reading import open_log
 from pretouch.imported_data.torques import torque_recording
-from tests.imported_data.files import PANDA, START, STORE1, by_time, header, joints, wrench, write_bag
+from tests.imported_data.files import PANDA, START, STORE1, by_time, header, joints, wrench, write_bag, write_bag1
 from tests.imported_data.joint_files import Moving
 
 FR3 = tuple(f"fr3_joint{i}" for i in range(1, 8))
@@ -101,27 +99,24 @@ def test_topics_that_are_not_clear_are_one_sentence(tmp_path, short, messages, c
 def test_the_robot_state_of_franka_ros_is_read_from_a_bag_of_ros_1(tmp_path, short):
     store = get_typestore(Stores.ROS1_NOETIC)
     store.register(get_types_from_msg(FIELDS, STATE))
-    with Writer1(tmp_path / "old.bag") as writer:
-        connection = writer.add_connection("/franka_state_controller/franka_states", STATE, typestore=store)
-        for t, *arrays in zip(of_motion(short), short.q, short.qd, short.qd_d, -short.tau_ext, strict=True):
-            message = store.types[STATE](header(t, store=STORE1), *arrays)
-            writer.write(connection, int(t), store.serialize_ros1(message, STATE))
-    recording = torques_of(tmp_path / "old.bag")
+    rows = zip(of_motion(short), short.q, short.qd, short.qd_d, -short.tau_ext, strict=True)
+    messages = [("/states", t, store.types[STATE](header(t, store=STORE1), *arrays)) for t, *arrays in rows]
+    bag = write_bag1(tmp_path / "old.bag", messages, store)
+    recording = torques_of(bag)
     np.testing.assert_allclose(recording.tau_ext, short.tau_ext)
     np.testing.assert_allclose(recording.qd_commanded, short.qd_d)
-    np.testing.assert_allclose(open_log(tmp_path / "old.bag", Choice()).positions().arrays["q"], short.q)
+    np.testing.assert_allclose(open_log(bag, Choice()).positions().arrays["q"], short.q)
 
 
 def test_the_robot_state_of_franka_ros2_is_read(tmp_path, short):
     store = get_typestore(Stores.ROS2_JAZZY)
     store.register(get_types_from_msg(FIELDS2, STATE2))
-    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connection = writer.add_connection("/franka_robot_state_broadcaster/robot_state", STATE2, typestore=store)
-        for t, q, dq, dq_d, tau in zip(of_motion(short), short.q, short.qd, short.qd_d, -short.tau_ext, strict=True):
-            parts = [joints(t, q, FR3, dq), joints(t, q, FR3, dq_d), joints(t, NOTHING, FR3, effort=tau)]
-            message = store.types[STATE2](header(t), *parts)
-            writer.write(connection, int(t), store.serialize_cdr(message, STATE2))
-    assert "tau_ext" in open_log(tmp_path / "bag", Choice()).kinds
-    recording = torques_of(tmp_path / "bag")
+    messages = []
+    for t, q, dq, dq_d, tau in zip(of_motion(short), short.q, short.qd, short.qd_d, -short.tau_ext, strict=True):
+        parts = [joints(t, q, FR3, dq), joints(t, q, FR3, dq_d), joints(t, NOTHING, FR3, effort=tau)]
+        messages.append(("/states", t, store.types[STATE2](header(t), *parts)))
+    bag = write_bag(tmp_path / "bag", messages, store=store)
+    assert "tau_ext" in open_log(bag, Choice()).kinds
+    recording = torques_of(bag)
     np.testing.assert_allclose(recording.tau_ext, short.tau_ext)
     np.testing.assert_allclose(recording.qd_commanded, short.qd_d)
