@@ -145,15 +145,6 @@ def test_instants_are_true_whatever_a_clock_and_a_network_do(made, largest):
     assert np.abs(made(np.random.default_rng(4)).error()).max() < largest
 
 
-def test_datagrams_that_overtake_each_other_change_nothing():
-    rng = np.random.default_rng(6)
-    heard = unit(rng)
-    count = len(heard.batches["count"])
-    order = np.argsort(np.arange(count) + np.where(rng.random(count) < 0.1, 2.5, 0.0), kind="stable")
-    shuffled, error = heard.only(order), heard.error()
-    np.testing.assert_allclose(shuffled.error(), np.concatenate([error[heard.batch == b] for b in order]))
-
-
 @pytest.mark.parametrize("loss", [0.0, 0.5])
 @pytest.mark.parametrize("wrong", [-37, -2, 3, 40])
 def test_samples_that_a_unit_lost_and_miscounted_are_counted_by_its_clock(wrong, loss):

@@ -19,14 +19,7 @@ from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
 from pretouch.sensing.skin import paper_skin as skin_of_arm
-from pretouch.session.memory import (
-    FreeMotion,
-    ModelFile,
-    check_learnt,
-    load_learnt,
-    model_file_of,
-    save_learnt,
-)
+from pretouch.session.memory import FreeMotion, ModelFile, check_learnt, load_learnt, model_file_of, save_learnt
 from tests.following_arm import Arm
 
 PROFILE = PROFILES["pretouch"]

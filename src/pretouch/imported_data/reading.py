@@ -7,16 +7,7 @@ import numpy as np
 
 from pretouch import extras
 from pretouch.errors import RecordingError
-from pretouch.imported_data.log import (
-    BAGS,
-    PARQUET,
-    TABLES,
-    Choice,
-    ImportedRecording,
-    Log,
-    Note,
-    check_reach,
-)
+from pretouch.imported_data.log import BAGS, PARQUET, TABLES, Choice, ImportedRecording, Log, Note, check_reach
 from pretouch.robot.model import RobotModel
 from pretouch.traces import JointTrace
 from pretouch.types import BoolArray, FloatArray
