@@ -9,8 +9,6 @@ from pretouch.calibration.calibrate import calibrate
 from pretouch.calibration.values import CalibrationData
 from pretouch.errors import CalibrationError, RobotModelError
 from pretouch.sim.random_skin import random_skin
-from pretouch.traces import ImuTrace
-from tests.calibration.faulty import joined
 from tests.calibration.made import EXACT, MovingArm, Noise, pose_error
 
 
@@ -88,27 +86,6 @@ def test_stamps_may_count_from_long_ago(panda_model, good, pair):
     for unit, true in zip(found.units, pair.units, strict=True):
         assert unit.findings == ()
         assert np.linalg.norm(pose_error(true.T_link_sensor, unit.place.T_link_sensor)[3:]) < 1e-3
-
-
-def test_a_unit_may_have_measured_for_much_longer_than_the_arm_moved(panda_model, good):
-    data = with_a_long_wait(good, 600.0)
-    for unit in calibrate(panda_model, data).units:
-        assert unit.accepted
-        assert unit.findings == ()
-
-
-def with_a_long_wait(data: CalibrationData, wait: float) -> CalibrationData:
-    """Units lie still for so long [s] before, with noise."""
-    rng = np.random.default_rng(0)
-    before = np.arange(-wait, -0.5, 0.005)
-    units = []
-    for unit in data.units:
-        imu = unit.imu
-        gravity = 9.81 * imu.acceleration[0] / np.linalg.norm(imu.acceleration[0])
-        felt = gravity + 0.015 * rng.standard_normal((len(before), 3))
-        lying = ImuTrace(before, felt, 0.002 * rng.standard_normal((len(before), 3)))
-        units.append(replace(unit, imu=joined(lying, imu)))
-    return CalibrationData(data.joints, tuple(units))
 
 
 def test_noise_of_the_joints_may_hide_a_place(panda_model, moving_arm, pair):

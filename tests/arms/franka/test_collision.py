@@ -4,7 +4,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from pretouch.arms.franka.limits import BIAS_N, collision_behavior, largest_threshold, longest_levers
+from pretouch.arms.franka.limits import BIAS_N, collision_behavior, largest_threshold
 from pretouch.contact.detector import Body
 from pretouch.contact.residual_model import sequential_init, sequential_numbers
 from pretouch.contact.sequential import Moment
@@ -40,12 +40,6 @@ def test_no_posture_turns_a_force_below_the_threshold_into_a_joint_reflex(panda_
         force = draw.normal(size=3)
         force *= 0.95 * behavior.upper_force[0] / np.linalg.norm(force)
         assert np.all(np.abs(jacobian.T @ force) < behavior.upper_torque)
-
-
-def test_levers_are_the_reach_of_the_arm(panda_model: RobotModel) -> None:
-    levers = longest_levers(panda_model)
-    assert 0.855 < levers[0] < 1.0  # the vendor's reach, and the hand
-    assert levers[6] < 1e-9
 
 
 def test_a_higher_threshold_of_ours_raises_the_arms(panda_model: RobotModel) -> None:
