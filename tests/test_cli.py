@@ -20,22 +20,6 @@ def run(capsys, *args):
     return code, capsys.readouterr()
 
 
-@pytest.mark.parametrize(
-    ("args", "words"),
-    [
-        (("live", "--port", "0"), "The port is 0: give one from 1 to 65535"),
-        (("replay", "/dev/null", "--no-page"), "/dev/null is no file"),
-        (("report", "/nowhere.mcap"), "/nowhere.mcap cannot be read: it does not exist"),
-    ],
-)
-def test_bad_input_ends_with_one_sentence_and_code_2(capsys, args, words):
-    code, said = run(capsys, *args)
-    assert code == 2
-    assert words in said.err
-    assert said.err.count("\n") == 1
-    assert said.out == ""
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_signals_while_words_are_read_end_it_in_order(monkeypatch, number):
     before = signal.getsignal(number)

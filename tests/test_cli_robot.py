@@ -98,5 +98,3 @@ def test_a_ready_posture_that_is_not_clear_is_said_and_the_import_is_kept(tmp_pa
 def test_a_folder_that_is_no_arm_is_said(tmp_path, capsys):
     assert main(["robot", "check", str(tmp_path)]) == 2
     assert "robot.toml cannot be read" in capsys.readouterr().err
-    assert main(["reproduce", "static", "--arm", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
-    assert "robot.toml cannot be read" in capsys.readouterr().err

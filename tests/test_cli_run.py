@@ -72,6 +72,7 @@ def at_begin(monkeypatch, seconds, then):
         (("--no-learnt", "--learnt", "a.toml"), "--no-learnt does not go with"),
         (("--arm", "ur5"), "There is no arm 'ur5'"),
         ((*BLIND[1:], "--learnt", "new.toml"), "does not learn free motion"),
+        (("--record", "/dev/null"), "/dev/null exists already: give another file to --record."),
     ],
 )
 def test_what_does_not_fit_together_is_refused_in_a_sentence(words, said, capsys):
@@ -113,13 +114,6 @@ def test_an_arm_that_does_not_come_with_the_package_has_its_path_placed_and_that
     assert len(given.assumed) == 1  # of the simulated arm, not of a path that is given
     usual = run_setup(Simulated(), RobotOptions(), SkinOptions(), TaskOptions())
     assert usual.assumed == ()
-
-
-def test_a_recording_that_is_there_is_not_written_over(tmp_path, capsys):
-    (tmp_path / "a.mcap").write_text("precious")
-    assert cli.main([*BLIND, "--record", "a.mcap"]) == 2
-    assert "exists already" in capsys.readouterr().err
-    assert (tmp_path / "a.mcap").read_text() == "precious"
 
 
 @pytest.mark.slow

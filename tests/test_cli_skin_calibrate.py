@@ -55,12 +55,6 @@ def test_what_makes_no_sense_is_said_in_one_sentence(tmp_path, monkeypatch, caps
     assert "planned" not in told.out
 
 
-def test_a_swing_that_would_be_too_long_is_said(capsys):
-    with pytest.raises(SystemExit):
-        calibrate("--plan", "m.csv", "--swing-s", "100")
-    assert "PlanParams.swing_s is 100.0" in capsys.readouterr().err
-
-
 def test_files_that_are_there_are_not_written_over_unasked(tmp_path, capsys):
     there = tmp_path / "there"
     there.write_text("mine")

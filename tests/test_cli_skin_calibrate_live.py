@@ -3,7 +3,7 @@
 import re
 import signal
 import time
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from types import SimpleNamespace
 from unittest.mock import Mock
 
@@ -19,7 +19,6 @@ from pretouch.cli.calibrate import live
 from pretouch.errors import RecordingError, RobotError
 from pretouch.sensing.skin import load_skin
 from pretouch.session.run import Ending, go
-from pretouch.signals import Terminated, ends_raise, exit_code, noted_in_motion
 from pretouch.units.skin import NetworkSkin, Traffic
 from pretouch.units.skin_reader import read_skin
 from tests.calibrated_arm import assert_same_places
@@ -81,23 +80,6 @@ def test_nothing_is_said_of_rest_where_the_arm_is_lost_between_two_motions(panda
         live._move(OpenedArm(arm), panda_model, [plan, plan], measurements)
     assert arm.begun == 1
     assert capsys.readouterr().out.splitlines() == [*["The arm moves for 0 s."] * 2, "It is recorded."]
-
-
-def test_the_signal_that_came_first_ends_the_command_whatever_comes_while_others_are_heard_again(monkeypatch):
-    really = signal.signal
-
-    def interrupted(number, handler):
-        before = really(number, handler)
-        if number == signal.SIGINT and came:
-            monkeypatch.undo()
-            signal.raise_signal(signal.SIGINT)
-        return before
-
-    with ends_raise(), suppress(Terminated, KeyboardInterrupt), noted_in_motion() as came:
-        monkeypatch.setattr(signal, "signal", interrupted)
-        signal.raise_signal(signal.SIGTERM)
-        signal.raise_signal(signal.SIGINT)
-    assert exit_code() == 128 + signal.SIGTERM
 
 
 @pytest.fixture

@@ -38,8 +38,6 @@ from pretouch.types import (
     ControlStep,
     Inputs,
     Mode,
-    Obstacles,
-    QpSolution,
     RangeReadings,
     RobotState,
     Thresholds,
@@ -238,16 +236,6 @@ class Chained(NamedTuple):
 def test_what_a_part_remembers_and_no_recording_can_hold_is_named(run, remembered, words):
     with pytest.raises(RecordingError, match=words):
         packed_state(replace(run.cycles[-1].before, reaction=remembered), False)
-
-
-MIRRORED = {Obstacles: "Obstacles", Contact: "Contact", QpSolution: "QpSolution", Touched: "Touched",
-            ControlStep: "Step", Truth: "Truth"}  # fmt: skip
-
-
-@pytest.mark.parametrize("kind", MIRRORED)
-def test_messages_mirror_the_types_field_by_field(kind):
-    there = {name for name, _ in messages().store.fielddefs[own(MIRRORED[kind])][1]}
-    assert there - {"sequence", "has_contact"} == {name for name, _ in hints_of(kind)}
 
 
 def test_the_rows_of_the_thresholds_have_their_names(run):

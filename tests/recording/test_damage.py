@@ -161,6 +161,8 @@ def test_what_is_no_recording_of_ours_is_refused_with_the_way_out(tmp_path):
         open_recording(place)
     with pytest.raises(RecordingError, match="Is a directory"):
         open_recording(tmp_path)
+    with pytest.raises(RecordingError, match="/dev/null is no file"):
+        open_recording(Path("/dev/null"))
     place.touch()
     with pytest.raises(RecordingError, match="is empty"):
         open_recording(place)

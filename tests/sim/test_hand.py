@@ -76,15 +76,6 @@ def test_a_hand_pushes_with_no_more_than_its_force(plant_with_hand, force_max):
     assert np.linalg.norm(plant.hand.velocity) < 0.02
 
 
-def test_a_soft_goal_inside_the_arm_pushes_as_its_spring(plant_with_hand):
-    plant = plant_with_hand((0.3069, 0.0, 0.4262))
-    Hand(plant, Script(stay((0.3069, 0.0, 0.4362)), force_max=100.0), PersonArm(speed_max=0.1))
-    plant.advance(1.0)
-    depth = 0.4362 - (plant.mj_data.body("hand").xpos[2])
-    assert 0.006 < depth < 0.01
-    assert plant.true_force[2] == pytest.approx(2000.0 * depth, rel=0.03)
-
-
 # Touches
 
 

@@ -156,14 +156,6 @@ def test_the_arm_differs_from_its_model_as_asked(panda_model):
     assert built.nu == 0
 
 
-def test_a_hand_left_alone_weighs_nothing_and_stays(panda_model):
-    built = build(panda_model, SceneSpec(hand=HandSpec()), nominal(panda_model))
-    data = mujoco.MjData(built)
-    mujoco.mj_step(built, data, nstep=200)
-    assert np.abs(data.qpos[-3:]).max() < 1e-9
-    assert built.body("hand").mass == pytest.approx(0.6)
-
-
 @pytest.mark.parametrize(("height", "radius"), [(-0.2, 0.1), (-0.45, 0.15)])
 def test_the_declared_fixtures_are_those_that_were_built(panda_model, height, radius):
     spec = SceneSpec(floor_height=height, pedestal_radius=radius)
