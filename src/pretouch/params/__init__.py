@@ -27,8 +27,8 @@ class LocalMapParams(Checked):
     cell_m: Positive = 0.02
     """Edge of a cell, in which one place is remembered [m]; two and four times that for wider looks."""
     fist_m: NonNegative = 0.04
-    """Radius of the ball behind a seen surface for which a place stands [m]: about half of a fist's width. A unit sees
-    one side of an object, and the arm may come from another."""
+    """Radius of the ball behind a seen surface for which a place stands [m]: half of a fist's width. A unit sees one
+    side of an object, and the arm may come from another."""
     mark_m: Positive = 0.8
     """Distance from a unit up to which its readings are remembered [m]: more than a restriction notices."""
     carve_m: Positive = 0.6
