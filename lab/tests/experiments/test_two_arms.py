@@ -5,7 +5,7 @@ import pytest
 
 from pretouch.profiles import profile
 from pretouch_lab.experiments import two_arms
-from pretouch_lab.experiments.two_arms import BACK, Reaches, play, reaches, way
+from pretouch_lab.experiments.two_arms import BACK, play, reaches, way
 
 
 def test_both_ways_begin_on_one_side_and_cross_the_middle():
@@ -18,12 +18,15 @@ def test_both_ways_begin_on_one_side_and_cross_the_middle():
 
 
 def test_a_person_reaches_stays_and_withdraws():
-    person = Reaches(5.0, np.array([[0.5, 0.0, 0.3], [0.6, 0.0, 0.3]]))
-    goals = [person.goal(t, np.zeros(3), None).position[0] for t in (4.9, 5.1, 8.0, 8.2, 12.1, 19.1)]
-    assert goals == [0.55, 0.5, 0.5, 0.55, 0.6, 0.55]
     drawn = reaches(np.random.default_rng(0), 40.0)
-    assert len(drawn.aims) == 6
-    assert 5.0 <= drawn.begin <= 8.0
+    begin, rests = drawn.times[1], [0.55, -0.8, 0.45]
+    assert 5.0 <= begin <= 8.0
+    assert len(drawn.times) == 6 * 4
+    after = (-0.1, 0.1, 3.0, 3.2, 7.1, 11.0)
+    goals = [drawn.goal(begin + t, np.zeros(3), None).position.tolist() for t in after]
+    assert goals[0] == goals[3] == goals[5] == rests
+    assert goals[1] == goals[2] != goals[4]
+    assert np.abs(np.subtract([goals[1], goals[4]], [0.55, 0.0, 0.3])).max() <= 0.08
 
 
 @pytest.mark.slow
