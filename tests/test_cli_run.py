@@ -170,7 +170,7 @@ LEARNING = (
 @pytest.mark.slow
 def test_a_second_run_begins_with_what_the_first_learnt_and_can_be_recomputed(tmp_path, capsys):
     place = tmp_path / "state" / "pretouch" / "free-motion" / "simulated-panda-seed-0.toml"
-    known = "Free motion of this robot is known (2 s"
+    known = "Free motion of this robot is known ("
     for name, told in (("a", "This robot's free motion is not known yet"), ("b", known)):
         assert cli.main([*LEARNING, "--seconds", "2", "--record", f"{name}.mcap"]) == 0
         said = capsys.readouterr().out
