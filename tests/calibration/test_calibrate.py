@@ -75,10 +75,6 @@ def test_a_link_that_the_arm_does_not_have_is_refused(panda_model, good):
         calibrate(panda_model, replace(good, units=(replace(good.units[0], link="panda_elbow"),)))
 
 
-def test_no_units_make_an_empty_calibration(panda_model, good):
-    assert calibrate(panda_model, CalibrationData(good.joints, ())).units == ()
-
-
 def test_stamps_may_count_from_long_ago(panda_model, good, pair):
     ago = 1.7e9
     units = tuple(replace(unit, imu=replace(unit.imu, stamp=unit.imu.stamp + ago)) for unit in good.units)

@@ -17,27 +17,14 @@ from pretouch.traces import JointTrace
 from tests.calibration.made import MovingArm, Noise, pose_error
 
 
-def pose(x: float, y: float, z: float) -> np.ndarray:
-    T = np.eye(4)
-    T[:3, :3] = [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
-    T[:3, 3] = x, y, z
-    return T
-
-
-def covariance(*free: tuple[np.ndarray, float]) -> np.ndarray:
-    """Everything is known well, but for these twists (6,) in the link frame, each by its standard deviation."""
-    C = np.diag(np.repeat((1e-4, 1e-4), 3) ** 2)
-    for twist, sigma in free:
-        C += sigma**2 * np.outer(twist, twist)
-    back = np.eye(6)
-    back[:3, :3] = pose(0, 0, 0)[:3, :3].T
-    return back @ C @ back.T
-
-
 def test_a_direction_is_named_by_its_coordinates():
-    along = np.concatenate([np.zeros(3), [0.6, 0.8, 0.0]])
-    turn = np.concatenate([[1.0, 0.0, 0.0], np.zeros(3)])
-    assert unknown_directions(covariance((along, 0.05), (turn, 0.2)), pose(0.1, 0.0, 0.2)) == [
+    """All is known well, but for one direction in the link's frame, and one axis of it to turn about."""
+    T, C = np.eye(4), 1e-8 * np.eye(6)
+    T[:3, :3] = [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
+    along, turn = np.array([0.6, 0.8, 0.0]), T[:3, :3].T @ [1.0, 0.0, 0.0]
+    C[3:, 3:] += 0.05**2 * np.outer(along, along)
+    C[:3, :3] += 0.2**2 * np.outer(turn, turn)
+    assert unknown_directions(C, T) == [
         "its position along (0.60, 0.80, 0.00) of the link (sigma 50 mm)",
         "its orientation about x of the link (sigma 11.5 degrees)",
     ]

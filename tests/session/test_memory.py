@@ -197,11 +197,6 @@ def test_writing_that_fails_is_a_sentence_and_leaves_the_old_file(file, arm, ano
     assert [file.name for file in file.path.parent.iterdir()] == [file.path.name]
 
 
-def test_a_folder_that_cannot_be_made_is_a_sentence(tmp_path, arm):
-    (tmp_path / "file").write_text("")
-    assert "could not be saved" in learnt(model_file_of("panda at here", tmp_path / "file"), arm)[0]
-
-
 KILLED = """
 import os, signal, sys
 from pathlib import Path
