@@ -12,15 +12,8 @@ import pytest
 
 import pretouch
 from pretouch import compiled
-from pretouch.robot.kinematics import below
-from pretouch.source_digest import source_digest
 
 PACKAGE = Path(pretouch.__file__).parent
-
-
-def test_what_is_kept_carries_the_digest_of_all_that_may_get_into_it():
-    assert below(np.ones(3), 2.0)
-    assert list(Path(below.stats.cache_path).glob(f"kinematics.below-{source_digest(below)[:12]}*"))
 
 
 def test_a_function_without_text_works_all_the_same():
@@ -141,17 +134,3 @@ def test_a_function_is_kept_between_processes_until_what_it_calls_changes(tmp_pa
     # of another length: Python takes a file of the same length and second for the one that it has bytecode of
     (package / "callee.py").write_text(callee.replace("2.0", "10.0"))
     assert in_python(CALL, PYTHONPATH=str(tmp_path)).split() == ["11.0", "0"]
-
-
-@compiled.kernel
-def half(x: float) -> float:
-    return x / 2
-
-
-@compiled.entry
-def quarter(x: float) -> float:
-    return half(half(x))
-
-
-def test_a_part_of_compiled_functions_may_be_called_from_python_too():
-    assert quarter(6.0) == half(3.0) == 1.5
