@@ -92,7 +92,7 @@ def at_once(monkeypatch, paper_skin):
         yield OpenedArm(arm, skin=Units())
 
     monkeypatch.setattr(Simulated, "open", opened)
-    monkeypatch.setattr(live, "skin_for", lambda *_: paper_skin)
+    monkeypatch.setattr(live, "skin_for", lambda *_, **__: paper_skin)
     monkeypatch.setattr(live.UnitWatch, "wait", lambda *_: None)
     monkeypatch.setattr(live, "_plans", lambda *_: [])
 

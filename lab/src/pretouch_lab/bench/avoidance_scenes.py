@@ -94,7 +94,7 @@ def place(name: str = PANDA) -> Placement:
 def skin(name: str, of: str = PANDA) -> Skin:
     """Return the skin of a name in the scenarios; another arm than the Panda always has its own skin."""
     if of != PANDA:
-        return skin_for(arm(of), "")
+        return skin_for(arm(of), paper=True)
     return load_skin(scenario_path("dense_skin.toml"), arm()) if name == "dense" else paper_skin(arm())
 
 
