@@ -36,8 +36,7 @@ class LocalMapParams(Checked):
     tolerance_m: NonNegative = 0.05
     """Distance before a seen surface from which places are empty [m]: three times the noise, and half a footprint."""
     looks: PositiveCount = 3
-    """Number of looks that count for a place: as many see it empty before it is forgotten. One look alone is
-    remembered for the age limit of its reading, like a point of the paper."""
+    """Looks that count for a place: as many see it empty before it is forgotten. One alone lasts as long as a point."""
     kept_s: Positive = 12.0
     """Life of a place that nothing has seen again [s]."""
     per_link: PositiveCount = 6
