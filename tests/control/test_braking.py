@@ -110,16 +110,6 @@ def test_an_arm_that_keeps_the_limit_never_comes_nearer_than_the_margin():
     assert 0.02 - 1e-9 <= d < 0.0201
 
 
-def test_what_goes_out_of_sight_is_touched_once_it_is_old():
-    sled = stopping(0.0)
-    limits = []
-    for i in range(800):
-        sled.age = i * DT
-        limits.append(float(sled.rows(0.0, {0: (1, 0.02)})[2][0]))
-    assert limits[:600] == [0.0] * 600
-    assert limits[605] == pytest.approx(TOUCH)
-
-
 def test_while_a_contact_moves_the_arm_only_what_is_seen_now_counts():
     sled = stopping(0.0)
     sled.untouched = sys.maxsize, 0.0, SEEN_NOW_S

@@ -262,25 +262,6 @@ def test_eight_by_eight_zones_are_not_too_old_nor_silent_between_their_frames(pa
 # which places are obstacles
 
 
-def test_the_nearest_of_each_link_and_others_in_other_directions(panda_model, unit):
-    rng = np.random.default_rng(3)
-    looker = Looker(panda_model, unit, VL53L7CX())
-    for i in range(40):
-        looker.turn(rng.uniform(-60.0, 60.0))
-        for k in range(2):
-            now = 1.0 + 0.04 * i + 0.02 * k
-            near = looker.take(RangeReadings(np.full(16, now), rng.uniform(0.1, 0.7, 16), np.zeros(16, np.int64)), now)
-    assert len(near.unit) > 2 * MAP.per_link
-    assert len(set(near.slot.tolist())) == len(near.slot)
-    for link in np.unique(near.link):
-        mine = near.link == link
-        assert mine.sum() <= MAP.per_link
-        assert (np.diff(near.body_distance[mine]) >= 0.0).all()
-        apart = near.direction[mine] @ near.direction[mine].T - np.eye(mine.sum())
-        assert apart.max(initial=-1.0) <= np.cos(np.deg2rad(30.0)) + 1e-9
-    assert near.body_distance.max() < MAP.mark_m
-
-
 def test_a_full_map_loses_the_oldest_and_takes_the_newest_at_the_next_look(panda_model, unit):
     looker = Looker(panda_model, unit)
     grid = np.stack(np.meshgrid(*(0.0201 * np.arange(60) - 0.6,) * 3), axis=-1).reshape(-1, 3) + TCP
