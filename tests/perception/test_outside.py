@@ -150,14 +150,6 @@ def test_of_any_points_each_link_keeps_the_nearest_ones_in_different_directions(
     assert len(set(near.slot.tolist())) == len(near.slot)
 
 
-def test_both_sides_of_a_link_are_kept(watcher):
-    other = TCP + np.array([0.0, -0.45, 0.0])
-    crowd = BESIDE + np.random.default_rng(1).uniform(0.0, 0.02, (50, 3))
-    near = watcher.see(1.0, points_at(1.0, BESIDE, *crowd, other))
-    shown = {round(float(y), 2) for y in near.point[:, 1]}
-    assert {0.4, -0.45} <= shown
-
-
 def test_a_point_lasts_until_its_source_shows_it_gone_or_counts_as_silent(panda_model):
     silent, answering = Watcher(panda_model), Watcher(panda_model)
     for watcher in (silent, answering):
