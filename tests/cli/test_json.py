@@ -31,7 +31,17 @@ def single(name: str, kind: Any) -> Iterator[tuple[str, Any]]:
 
 COMMANDS: dict[str, Any] = dict(pair for name in command_names() for pair in single(name, command_class(name)))
 """Class of each command, by its words."""
-WITHOUT = {"live", "report", "skin simulate", "skin provision", "warm-up", "serve-fci", "figure", "policy"}
+WITHOUT = {
+    "live",
+    "report",
+    "skin check-unit",
+    "skin simulate",
+    "skin provision",
+    "warm-up",
+    "serve-fci",
+    "figure",
+    "policy",
+}
 """Commands that conclude with no numbers: they serve a page or an arm, write a page or a picture, or set up."""
 
 

@@ -166,10 +166,10 @@ def _fading_rows(
 
 @kernel
 def _limit_across(p: BrakingNumbers, distance: float) -> float:
-    """Return v_t [m/s]: linear from the slowest at the surface to the task's speed at that distance."""
+    """Return v_t [m/s]: the slowest within the margin, and from there linear to the task's speed at that distance."""
     if not distance < p.across.distance_m:
         return np.inf
-    share = max(0.0, distance) / p.across.distance_m
+    share = max(0.0, distance - p.curve.margin_m) / max(p.across.distance_m - p.curve.margin_m, 1e-9)
     return p.across.speed_m_s + share * max(0.0, p.fastest_m_s - p.across.speed_m_s)
 
 

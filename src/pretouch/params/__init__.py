@@ -55,9 +55,9 @@ class OutsidePoints(Checked):
     links and their capsules, 15 mm of posture and latency, 15 mm of edges: ours."""
     persistence_s: Positive = 0.15
     """Life of a point after its measurement [s]: 60 ms of latency and two lost frames of a camera at 30 Hz."""
-    hidden_s: NonNegative = 3.0
-    """Life of a point so near to the arm that it would pass for the arm [s]: measurements there are ambiguous. At 0.03
-    m/s, about a touch speed, it is the time through that margin. 0: the life of any other point."""
+    hidden_s: NonNegative = 12.0
+    """Life of a point so near to the arm that it would pass for the arm [s]: measurements there are ambiguous, and the
+    arm waits there. As long as that of a place that a unit saw; 0: the life of any other point."""
     slow_after_s: Positive = 0.2
     """Age of a source's newest measurement at which the arm begins to slow [s]: `persistence_s`, and another frame."""
     silent_after_s: Positive = 0.4

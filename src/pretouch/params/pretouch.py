@@ -158,8 +158,9 @@ class Tangential(Checked):
 
     distance_m: Positive = 0.1
     """Body distance below which the limit applies [m]."""
-    speed_m_s: Positive = 0.1
-    """Speed across the normal at the surface [m/s]; from there it grows linearly to the task's: ours."""
+    speed_m_s: Positive = 0.05
+    """Speed across the normal within the margin [m/s]; from there it grows linearly to the task's: about the touch
+    speed, for what a unit saw may be larger than the ball that is remembered of it."""
 
 
 @dataclass(frozen=True)

@@ -125,10 +125,11 @@ def replace_wider(places: LocalMap, at: FloatArray, stamp: float, width: float) 
 
 
 @kernel
-def height_over(places: LocalMap, position: FloatArray, beam: FloatArray, reach: float) -> float:
+def height_over(places: LocalMap, position: FloatArray, beam: FloatArray, reach: float, look: Look) -> float:
     """Return the least height [m] along a beam (3,) of the places within `reach` [m] ahead of a sensor, else `reach`.
 
-    A sensor at `position` (3,) [m] that only tells that something is nearer than it measures may show one of these.
+    A sensor at `position` (3,) [m] that only tells that something is nearer than it measures may show any of these:
+    they are seen.
     """
     least, to = reach, np.empty(3)
     for m in range(places.number[0]):
@@ -136,6 +137,8 @@ def height_over(places: LocalMap, position: FloatArray, beam: FloatArray, reach:
             to[i] = places.place[m, i] - position[i]
         if places.looks[m] > 0 and dot(to, to) < reach * reach and dot(to, beam) > 0.0:
             least = min(least, dot(to, beam))
+            places.stamp[m], places.empty_since[m] = max(places.stamp[m], look.stamp), np.inf
+            places.until[m] = max(places.until[m], look.stamp + look.lasts[1])
     return least
 
 

@@ -187,14 +187,14 @@ def _remember_readings(
         if not (young[k] and shows[k] and distance[k] <= p.mark_m):
             continue
         kind, beam, velocity = cones.kind[k], sensors.rotation[k, :, 2], tracks.motion[1, k].copy()
-        height = distance[k] + p.fist_m
-        if distance[k] <= cones.range[kind, 0]:
-            # a target at the minimum may be anywhere before it: it is as near as it was seen before
-            height = height_over(places, sensors.position[k], beam, height)
-        for i in range(3):
-            at[i] = sensors.position[k, i] + height * beam[i]
         turned = np.sqrt(sight.skin.orientation_sigma[k] ** 2 + cones.spread[kind] ** 2)
         u = spread(sight.sigmas, sight.skin.position_sigma[k], turned, distance[k])
-        width = distance[k] * cones.edge[kind, 2]
+        height, width = distance[k] + p.fist_m, distance[k] * cones.edge[kind, 2]
+        look = Look(stamp[k], (lives[k], p.kept_s), width, u, k)
+        if distance[k] <= cones.range[kind, 0]:
+            # a target at the minimum may be anywhere before it: it is as near as it was seen before
+            height = height_over(places, sensors.position[k], beam, height, look)
+        for i in range(3):
+            at[i] = sensors.position[k, i] + height * beam[i]
         replace_wider(places, at, stamp[k], width)
-        remember(places, at, velocity, Look(stamp[k], (lives[k], p.kept_s), width, u, k), p)
+        remember(places, at, velocity, look, p)
