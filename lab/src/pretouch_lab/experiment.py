@@ -2,7 +2,6 @@
 
 import os
 import re
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
@@ -229,10 +228,3 @@ def recording_file(out: Path, cell: Row, seed: int) -> Path:
     safe = re.sub(r"[^A-Za-z0-9._+-]", "-", exact)  # + and - tell sides apart
     name = safe if safe == exact else f"{safe}-{sha256(exact.encode()).hexdigest()[:8]}"
     return out / "recordings" / f"{name}_{seed:04d}.mcap"
-
-
-def main(name: str) -> None:
-    """Reproduce one experiment from the command line, as `python -m pretouch_lab.experiments.static` does."""
-    from pretouch.cli import main as command
-
-    raise SystemExit(command(["reproduce", name, *sys.argv[1:]]))

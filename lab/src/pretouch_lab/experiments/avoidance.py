@@ -20,7 +20,7 @@ from pretouch.types import FloatArray
 from pretouch_lab.bench.obstacle import Ball, least_distance
 from pretouch_lab.bench.scenes import scenario
 from pretouch_lab.encounters import GHOST_M, LEAVING_S, SOFT_M_S, SOFT_N, encounters, ghosts, met
-from pretouch_lab.experiment import Context, Drawing, Experiment, controllers, first_sensing, main
+from pretouch_lab.experiment import Context, Drawing, Experiment, controllers, first_sensing
 from pretouch_lab.options import TrialOptions
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, medians, ratios, rounded, share_above, summary, table
@@ -261,5 +261,3 @@ def shown_cells(rows: list[Row]) -> list[Row]:
 
 _FIGURE = Drawing("circle", "End-effector path with a hand beside it", shown_cells)
 EXPERIMENT = Experiment("avoidance", cells, trial, tables, _FIGURE, any_arm=True)
-if __name__ == "__main__":
-    main(EXPERIMENT.name)

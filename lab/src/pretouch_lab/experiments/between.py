@@ -7,7 +7,7 @@ from pretouch.sim.hand import FACES, Push, Pusher, against
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.text_table import TextTable
 from pretouch.types import ControlStep
-from pretouch_lab.experiment import Context, Drawing, Experiment, controllers, first_sensing, main
+from pretouch_lab.experiment import Context, Drawing, Experiment, controllers, first_sensing
 from pretouch_lab.options import TrialOptions
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, medians, rounded
@@ -118,5 +118,3 @@ def tables(rows: list[Row]) -> list[TextTable]:
 
 _FIGURE = Drawing("close-up", "Distances and thresholds with objects on both sides", first_sensing)
 EXPERIMENT = Experiment("between", cells, trial, tables, _FIGURE)
-if __name__ == "__main__":
-    main(EXPERIMENT.name)

@@ -8,7 +8,7 @@ from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import TextTable
 from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray
-from pretouch_lab.experiment import Context, Drawing, Experiment, controllers, first_sensing, main
+from pretouch_lab.experiment import Context, Drawing, Experiment, controllers, first_sensing
 from pretouch_lab.options import TrialOptions
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, peak, rounded, summary, table
@@ -139,5 +139,3 @@ def tables(rows: list[Row]) -> list[TextTable]:
 
 _FIGURE = Drawing("interaction", "Distances, force with thresholds, velocity over thirty seconds", first_sensing)
 EXPERIMENT = Experiment("dynamic", cells, trial, tables, _FIGURE, any_arm=True)
-if __name__ == "__main__":
-    main(EXPERIMENT.name)

@@ -8,7 +8,7 @@ from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.scene import SceneSpec
 from pretouch.text_table import TextTable
 from pretouch_lab.bench.scenes import path_of
-from pretouch_lab.experiment import Context, Experiment, controllers, main
+from pretouch_lab.experiment import Context, Experiment, controllers
 from pretouch_lab.experiments import static
 from pretouch_lab.options import TrialOptions
 from pretouch_lab.run import Row
@@ -131,5 +131,3 @@ def _error(row: Row) -> str:
 
 
 EXPERIMENT = Experiment("mounting", cells, trial, tables)
-if __name__ == "__main__":
-    main(EXPERIMENT.name)

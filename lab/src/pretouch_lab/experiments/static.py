@@ -12,7 +12,7 @@ from pretouch.sim.plant import Plant
 from pretouch.text_table import TextTable
 from pretouch.traces import mean_over
 from pretouch.types import ControlStep
-from pretouch_lab.experiment import Context, Drawing, Experiment, controllers, main
+from pretouch_lab.experiment import Context, Drawing, Experiment, controllers
 from pretouch_lab.options import TrialOptions
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, medians, peak, ratios, rounded
@@ -193,5 +193,3 @@ def shown_cells(rows: list[Row]) -> list[Row]:
 
 _FIGURE = Drawing("force-difference", "Force and contact thresholds at the static object", shown_cells, ("blind",))
 EXPERIMENT = Experiment("static", cells, trial, tables, _FIGURE, any_arm=True)
-if __name__ == "__main__":
-    main(EXPERIMENT.name)

@@ -19,7 +19,7 @@ from pretouch.sim.range_finder import RangeFinders
 from pretouch.sim.scene import BasePose, HandSpec, SceneSpec, fixtures
 from pretouch.text_table import TextTable
 from pretouch.types import ControlStep, FloatArray, RobotState
-from pretouch_lab.experiment import Context, Experiment, controllers, main
+from pretouch_lab.experiment import Context, Experiment, controllers
 from pretouch_lab.experiments.avoidance import Walk
 from pretouch_lab.options import TrialOptions
 from pretouch_lab.run import Row
@@ -216,5 +216,3 @@ def tables(rows: list[Row]) -> list[TextTable]:
 
 
 EXPERIMENT = Experiment("two-arms", cells, trial, tables)
-if __name__ == "__main__":
-    main(EXPERIMENT.name)
