@@ -49,14 +49,6 @@ def test_closest_point_of_a_rod(point, body_point, direction, distance):
     np.testing.assert_allclose(found.body_distance, [distance], atol=1e-12)
 
 
-@pytest.mark.parametrize("height", [0.0, 0.4, 1.0])
-def test_on_the_axis_the_last_direction_holds(height):
-    found = _closest(_body(ROD), (0.0, 0.0, height), last=(0.0, 0.6, 0.8))
-    np.testing.assert_array_equal(found.direction, [[0.0, 0.6, 0.8]])
-    np.testing.assert_allclose(found.body_point, [[0.0, 0.06, height + 0.08]])
-    assert found.body_distance == pytest.approx(-0.1)
-
-
 @pytest.mark.parametrize("off", [1e-8, 1e-6, 1e-3, 0.099, 0.1, 0.101, 1.0])
 def test_the_direction_does_not_turn_on_the_way_through_the_surface(off):
     found = _closest(_body(ROD), (0.6 * off, 0.8 * off, 0.5))

@@ -121,13 +121,6 @@ def test_a_place_goes_after_three_looks_that_see_it_empty_and_not_before(looker,
     assert counts == [1, 1, 0, 0]
 
 
-def test_one_missed_reading_removes_nothing(looker):
-    looker.look(1.0, 0.3)
-    looker.look(1.02, 0.3)
-    assert len(looker.look(1.04, None).unit) == 1
-    assert len(looker.look(1.06, 0.3).unit) == 1
-
-
 @pytest.mark.parametrize(("reading", "stays"), [(0.34, True), (0.36, False)])
 def test_what_is_within_the_tolerance_of_a_reading_is_not_empty(looker, reading, stays):
     seen_three_times(looker)

@@ -28,10 +28,6 @@ def followed(distance, stamps=None, memory=MEMORY) -> list[float]:
     return speeds
 
 
-def test_nothing_is_known_after_one_reading():
-    assert followed([0.5]) == [0.0]
-
-
 @pytest.mark.parametrize("speed", [0.1, 0.5, 1.6, -0.3])
 def test_a_steady_approach_is_followed_without_bias(speed):
     assert followed(1.0 - speed * PERIOD * np.arange(60))[-1] == pytest.approx(speed, abs=0.01 * abs(speed))
@@ -63,13 +59,6 @@ def test_after_a_silence_it_begins_anew():
     found = followed([0.9, 0.88, 0.86, 0.7], stamps=[0.0, 0.02, 0.04, 0.4])
     assert found[2] > 0
     assert found[3] == 0.0
-
-
-def test_readings_that_are_not_taken_change_nothing():
-    tracks = track_init(2)._replace(point_stamp=np.zeros(2))
-    follow_points(tracks, np.ones((2, 3)), np.ones(2), np.array([True, False]), MEMORY)
-    np.testing.assert_array_equal(tracks.motion[:, 0], [[1, 1, 1], [0, 0, 0]])
-    assert np.isnan(tracks.motion[:, 1]).all()
 
 
 # late readings of an arm that moves: with the pose at their stamp, what stands still is where it stands
@@ -107,12 +96,6 @@ def test_a_plane_stays_where_it_is_while_the_arm_turns(panda_model, paper_skin):
     late = replace(exact, memory=None, outside=None)
     assert max(map(abs, errors(panda_model, paper_skin, exact))) < 0.004
     assert max(map(abs, errors(panda_model, paper_skin, late))) > 0.01, "and not where the arm has gone on to"
-
-
-def test_with_noise_its_place_is_within_noise(panda_model, paper_skin):
-    found = np.array(errors(panda_model, paper_skin, PROFILES["pretouch"].perception, 0.02))
-    assert abs(found.mean()) < 2 * 0.02 / np.sqrt(len(found))
-    assert found.std() == pytest.approx(0.02, rel=0.25)
 
 
 def test_poses_go_back_as_the_arm_came(panda_model, paper_skin):

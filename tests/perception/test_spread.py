@@ -77,15 +77,6 @@ def test_no_bit_changes_where_nothing_is_uncertain(panda_model, paper_skin, dist
         np.testing.assert_array_equal(getattr(near, name)[near.unit > 0], getattr(usual, name)[usual.unit > 0])
 
 
-def test_a_distance_from_the_body_may_be_negative_that_from_the_hand_may_not(panda_model, paper_skin):
-    watcher = Watcher(panda_model, unsure(paper_skin, panda_model, 0.5), FLOOR, BARE)
-    found = look(watcher, 0.1)
-    assert (found.body_distance < 0).all()
-    np.testing.assert_array_equal(found.ee_distance, 0.0)
-    assert watcher.now.get("scene.nearest") == 0.0
-    np.testing.assert_allclose(np.linalg.norm(found.direction, axis=1), 1.0, atol=1e-12)
-
-
 def test_a_kept_point_is_as_uncertain_as_it_is_now_far_from_its_unit(panda_model, paper_skin):
     skin = unsure(paper_skin, panda_model, orientation=0.1)
     watcher, exact = (Watcher(panda_model, of, FLOOR, BARE) for of in (skin, paper_skin))
