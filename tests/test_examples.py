@@ -30,7 +30,7 @@ def test_the_first_program_is_the_tutorials_and_does_what_the_tutorial_says(caps
     assert max(speed for speed, _ in tracked) > 0.25
     slow, sentence = tracked[-1]  # before the touch
     assert slow < 0.1
-    assert re.fullmatch(r"Waiting: left sees something at 0\.0\d m\. It continues when .*", sentence)
+    assert re.fullmatch(r"(Waiting|Slowed to \d+ %): left sees something at 0\.0\d m\..*", sentence)
     assert [mode for _, _, mode, *_ in lines if mode != "hold"][-1] == "react"
 
 
