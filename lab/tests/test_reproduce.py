@@ -124,12 +124,3 @@ def test_a_schedulers_workers_play_a_trial_as_this_process_does(tmp_path, contex
     cell = {"profile": "paper", "restrictions": "slack"}
     assert row == cell | {"seed": 0} | between.trial(cell, 0, context)[0]
     assert recording_file(out, cell, 0).exists()
-
-
-def test_an_experiment_can_be_run_alone(monkeypatch):
-    words = []
-    monkeypatch.setattr(cli, "main", lambda args: words.append(args) or 3)
-    monkeypatch.setattr("sys.argv", ["python", "--seeds", "1"])
-    with pytest.raises(SystemExit, match="3"):
-        lab_experiment.main("static")
-    assert words == [["reproduce", "static", "--seeds", "1"]]

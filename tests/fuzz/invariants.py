@@ -203,9 +203,10 @@ def approach_velocity(step: ControlStep, model: RobotModel) -> np.ndarray:
 
 
 def check_obstacles(step: ControlStep, units: int) -> None:
-    """One obstacle a unit at most, each with a unit vector."""
+    """One obstacle a slot at most, seen by a unit or an outside source, each with a unit vector."""
     o = step.obstacles
-    assert len(set(o.unit.tolist())) == len(o.unit) <= units
+    assert len(set(o.slot.tolist())) == len(o.slot)
+    assert ((o.unit >= 0) & (o.unit <= units)).all()
     assert (np.abs((o.direction**2).sum(axis=1) - 1.0) <= 1e-9).all()
 
 
