@@ -11,7 +11,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import skin_for
 from pretouch.types import ControlStep, Mode
 
-SHOWN_S = 15.0
+SHOWN_S = 10.0
 """Time within which the promise is to be seen."""
 
 
