@@ -158,7 +158,7 @@ class BothOptions(InWorlds):
 
 @dataclass(frozen=True)
 class RealOptions(Playing):
-    """Compare contact detectors on public recordings of real arms, which you download: false alarms, delays, links.
+    """Compare contact detectors on public recordings of real arms, which you download: false alarms, misses, delays.
 
     One half of each set's recordings gives the arm's load, offsets and friction, the other half tests the detectors;
     then the halves swap. docs/explanation/benchmarks.md describes the layout of the folder.
@@ -166,8 +166,8 @@ class RealOptions(Playing):
 
     sets: tyro.conf.Positional[Path] = field(kw_only=True)
     """Folder with a folder or file for each set, and `arms` from `pretouch robot import`."""
-    detectors: Words = ("fixed", "observer", "paper", "pretouch")
-    """Profiles, separated by commas."""
+    detectors: Words = ("fixed", "five-sigma", "learnt", "paper", "pretouch")
+    """Profiles, or five-sigma or learnt, which learn from the other half; separated by commas."""
 
 
 @dataclass(frozen=True)

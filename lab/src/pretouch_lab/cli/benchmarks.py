@@ -13,7 +13,6 @@ from pretouch import __version__
 from pretouch.calibration.motion.planner import plan_motion
 from pretouch.cli.tables import show
 from pretouch.errors import CalibrationError, ExperimentError
-from pretouch.profiles import profile
 from pretouch.realtime import check_wishes
 from pretouch.robot.description import files_digest, robot_named
 from pretouch.robot.model import RobotModel
@@ -116,8 +115,7 @@ def both(options: lab_options.BothOptions) -> dict[str, Any]:
 
 def real(options: lab_options.RealOptions) -> dict[str, Any]:
     """See its options."""
-    for name in options.detectors:
-        profile(name)  # an error now, and not after an hour
+    recorded.check(options.detectors)  # an error now, and not after an hour
     sets, left_out = sets_in(options.sets)
     trials = [({"set": each.name, "detector": name}, 0) for each in sets for name in options.detectors]
     out, folder = options.folder("bench-real"), options.sets.absolute()
