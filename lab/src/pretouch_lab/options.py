@@ -149,14 +149,6 @@ class ShieldOptions(Published):
 
 
 @dataclass(frozen=True)
-class BothOptions(InWorlds):
-    """Run the benchmarks detection and avoidance, and list which goals were reached.
-
-    About 40 minutes on two processors, with --quick three minutes. The same --out continues a run that was stopped.
-    """
-
-
-@dataclass(frozen=True)
 class RealOptions(Playing):
     """Compare contact detectors on public recordings of real arms, which you download: false alarms, misses, delays.
 

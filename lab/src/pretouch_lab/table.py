@@ -86,23 +86,6 @@ def ratios(
     ]
 
 
-def median_bounds(values: Sequence[float]) -> tuple[float, float]:
-    """95 % bounds on a median, two of the sorted values; they hold for any distribution."""
-    from scipy.stats import quantile_test  # half a second, which workers do not need
-
-    interval = quantile_test(values, p=0.5).confidence_interval(0.95)
-    low, high = float(interval.low), float(interval.high)
-    # fewer than six values have no such pair: the bounds are their range
-    return min(values) if np.isnan(low) else low, max(values) if np.isnan(high) else high
-
-
-def share_below(events: int, of: int) -> float:
-    """95 % upper bound on a share with `events` counted among `of` (Clopper and Pearson)."""
-    from scipy.stats import binomtest
-
-    return float(binomtest(events, of).proportion_ci(0.95, "exact").high) if of else 1.0
-
-
 def share_above(events: int, of: int) -> float:
     """95 % lower bound, one-sided, on a share with `events` counted among `of` (Clopper and Pearson)."""
     from scipy.stats import binomtest

@@ -1,7 +1,7 @@
 import pytest
 
 from pretouch.errors import ExperimentError
-from pretouch_lab.bench.avoidance import plays, summarise, tables
+from pretouch_lab.bench.avoidance import losses, plays, summarise, tables
 
 
 def row(baseline, seed, scenario="drdo", family="drdo", **measures):
@@ -45,3 +45,20 @@ def test_what_cannot_be_played_is_refused():
         plays("published", True, ["paper", "paper"])
     with pytest.raises(ExperimentError, match="The scenario 'moon' is unknown: choose from srdo"):
         plays("published", True, names=["drdo", "moon"])
+
+
+def test_every_cell_another_baseline_wins_is_shown():
+    def cell(baseline, **medians):
+        names = ("true_peak_20ms_n", "clamping_force_n", "cycle_time_s", "tracking_rms_m", "jerk_rms_rad_s3", "held_s",
+                 "livelock_s", "least_distance_m", "speed_m_s")  # fmt: skip
+        usual = dict.fromkeys(names, 1.0) | medians
+        return {"scenario": "drdo", "contender": baseline, **{k: {"median": v, "n": 1} for k, v in usual.items()}}
+
+    table = losses([
+        cell("pretouch", cycle_time_s=None), cell("ding", least_distance_m=1.2, true_peak_20ms_n=0.96),
+        cell("flacco", least_distance_m=1.5, held_s=2.0),
+    ])  # fmt: skip
+    assert table.rows == (
+        ("drdo", "turn [s]", ">", "ding 1.0, flacco 1.0"),
+        ("drdo", "least distance [mm]", "1000", "flacco 1500, ding 1200"),
+    )

@@ -1,8 +1,8 @@
-"""`pretouch bench real` on fabricated recordings: adapters, halves, correction, the count."""
+"""`pretouch bench real` on fabricated recordings: adapters, halves, correction, pushes, methods, the count."""
 
 import json
 from dataclasses import replace
-from types import SimpleNamespace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +12,12 @@ from tests.imported_data.joint_files import Moving
 from pretouch import cli
 from pretouch.errors import ExperimentError
 from pretouch.recording.compare import DetectedContact
+from pretouch.text_table import markdown
+from pretouch_lab.baselines.window_network import features, learnt
 from pretouch_lab.bench import real as bench
-from pretouch_lab.bench.real import halves, parted, tally, total, trial
+from pretouch_lab.bench.players import Alarms, five_sigma
+from pretouch_lab.bench.pushes import RealPushes, in_any_direction, pushed, starts, told_least
+from pretouch_lab.bench.real import alarms, contacts, delays, halves, parted, tables, trial
 from pretouch_lab.bench.real_sets import SETS, RealRun, corrected, files_digest, sets_in, stream_of
 
 FRANKA, UR10E, GLOVE = SETS[0], SETS[3], SETS[4]
@@ -124,13 +128,13 @@ def test_each_detector_is_shown_corrections_of_the_other_half_alone(folder, monk
         fitted.append(set(runs))
         return corrected(given, runs)
 
-    def count(given, alarms, course, runs, joints):
+    def count(given, played, runs):
         judged.append((set(fitted[-1]), set(runs), [int(number) for number in dict.fromkeys(given.run.tolist())]))
-        return tally(given, alarms, course, runs, joints)
+        return alarms(given, played, runs)
 
     monkeypatch.setattr(bench, "corrected", fit)
-    monkeypatch.setattr(bench, "tally", count)
-    trial(folder, {"set": "franka_fast", "detector": "fixed"}, 0)
+    monkeypatch.setattr(bench, "alarms", count)
+    trial(folder, {"set": "franka_fast", "detector": "five-sigma"}, 0)
     assert len(judged) == 2
     for learn, runs, order in judged:
         assert not learn & runs
@@ -148,64 +152,172 @@ def test_load_and_friction_of_one_half_explain_the_other(stream):
     assert np.abs(after.mean(axis=0)).max() < 0.1
 
 
-def alarm(time, end, link="panda_link5"):
-    return DetectedContact(time, np.zeros(3), "", link or None, np.zeros(3), end, 1.0, 2.0)
+def flags(time, *spans):
+    return np.any([(time >= begin) & (time < end) for begin, end in spans], axis=0)
 
 
-def test_alarms_are_counted_by_hand(stream):
-    """One run of 6 s: not sure from 1.9 to 2 s, touched from 2 to 2.2 s and, as one with it, from 2.4 to 2.5 s."""
+def test_alarms_and_contacts_are_counted_by_hand(stream):
+    """One run of 6 s: uncertain from 1.9 to 2 s, touched from 2 to 2.2 s and, as one with it, from 2.4 to 2.5 s."""
     one = stream.only([1, 0])
     time, label = one.recording.time, np.zeros(len(one.recording.time), np.int64)
     for begin, end, kind in ((1.9, 2.0, -1), (2.0, 2.2, 1), (2.4, 2.5, 1), (4.0, 4.3, 1), (5.0, 5.2, -1)):
         label[np.searchsorted(time, begin) : np.searchsorted(time, end)] = kind
-    labelled = replace(one, label=label)
-    cycles = np.concatenate([np.arange(0.005, 6.0, 0.01), np.arange(7.005, time[-1], 0.01)])
-    armed = cycles > 1.0
+    labelled, cycles = replace(one, label=label), np.arange(0.005, time[-1], 0.01)
 
-    def counted(*alarms):
-        return tally(labelled, alarms, SimpleNamespace(time=cycles, judged=armed), [1], [(), (5,)])
+    def counted(*spans, links=()):
+        named = tuple(DetectedContact(at, np.zeros(3), "", link, np.zeros(3), at, 1.0, 2.0) for at, link in links)
+        played = Alarms(cycles, flags(cycles, *spans), np.full(len(cycles), np.nan), named)
+        return alarms(labelled, played, [1]) | contacts(labelled, played, [1], [(), (5,)])
 
-    names = ("found", "contacts", "busy", "false_alarms", "link_right", "link_said")
+    names = ("false_alarms", "contacts", "link_right", "link_named")
+    # an alarm in a contact, one in an uncertain contact, one of the other run, and one between runs
+    links = ((2.06, "panda_link5"), (4.11, "panda_link4"))
+    row = counted((2.05, 2.5), (4.1, 4.3), (5.1, 5.15), (6.2, 6.4), (8.0, 8.5), links=links)
+    assert [row[name] for name in names] == [0, 2, 1, 2]
+    np.testing.assert_allclose(row["delays_contacts_ms"], [50.0, 100.0], atol=6.0)
+    # all time of the run but 1.9 to 2.6, 4 to 4.4 and 5 to 5.3 s, a standing arm included
+    assert row["free_s"] == pytest.approx(6.0 - 0.7 - 0.4 - 0.3, abs=0.05)
+    # a break of 0.3 s divides no alarm, one of 0.6 s does; one that began earlier finds no contact
+    row = counted((0.2, 0.3), (0.6, 0.7), (1.3, 2.1))
+    assert [row["false_alarms"], row["delays_contacts_ms"]] == [2, []]
+    # one that lasts counts again every two seconds: 1 + 2 of 0 to 5.9 s
+    assert counted((0.0, 5.9))["false_alarms"] == 3
 
-    def numbers(count):
-        return tuple(count[name] for name in names)
 
-    nothing = counted()
-    assert numbers(nothing) == (0, 2, 0, 0, 0, 0)
-    # armed from 1 s to the end at 6 s, less 1.9 to 2.6, 4 to 4.4 and 5 to 5.3 s
-    assert nothing["motion_s"] == pytest.approx(5.0 - 0.7 - 0.4 - 0.3, abs=0.05)
-    # one of a contact that is not sure, and one of a run that is not judged
-    both = counted(alarm(2.05, 2.5), alarm(4.1, 4.3, "panda_link4"), alarm(5.1, 5.1), alarm(7.5, 8.0))
-    assert numbers(both) == (2, 2, 0, 0, 1, 2)
-    np.testing.assert_allclose(both["delays_s"], [0.05, 0.1], atol=0.005)
-    early = counted(alarm(1.5, 2.1), alarm(4.39, 4.4, ""))
-    assert numbers(early) == (1, 1, 1, 1, 0, 0)
-    assert counted(alarm(0.5, 0.6))["false_alarms"] == 0  # not armed
-    row = total([both, early])
-    assert numbers(row) == (3, 3, 1, 1, 1, 2)
-    assert row["median_delay_ms"] == pytest.approx(100.0, abs=5.0)
-    assert row["per_hour"] == pytest.approx(3600.0 / (2 * 3.6), rel=0.02)
-    row = total([nothing | {"motion_s": 1800.0, "false_alarms": 1}])
-    assert (row["per_hour"], row["link_right"], row["median_delay_ms"]) == (2.0, None, None)
-    assert row["per_hour_high"] == pytest.approx(11.143, abs=1e-3)
-    assert total([nothing | {"motion_s": 0.0}])["per_hour"] is None
+def test_a_push_is_found_unless_an_alarm_was_there_before_or_comes_without_it():
+    cycles = np.arange(0.005, 10.0, 0.01)
+    pushes = RealPushes(np.array([1.0, 3.0, 5.0, 7.0]), np.ones((4, 3)), np.zeros(4, np.bool_))
+    nothing = np.full(len(cycles), np.nan)
+    untouched = Alarms(cycles, flags(cycles, (5.1, 5.2)), nothing)
+    touched = Alarms(cycles, flags(cycles, (1.04, 1.3), (2.95, 3.2), (5.05, 5.2), (7.21, 7.3)), nothing)
+    every = delays(pushes, untouched, touched)
+    assert every[0] == pytest.approx(0.045, abs=1e-9)
+    assert every[1:] == [None, None, None]
+
+
+def test_a_push_adds_what_the_observer_makes_of_driving_torques_without_its_share(stream, motions, panda_model):
+    start = starts(stream, [0, 1], 2.0, seed=3)
+    pushes = in_any_direction(start, 20.0, seed=4)
+    assert pushes.forearm.tolist() == [k % 2 == 1 for k in range(len(start))]
+    np.testing.assert_allclose(np.linalg.norm(pushes.force, axis=1), 20.0)
+    # the oracle: forces on the links themselves, taken off the driving torques before the observer
+    spoilt, offset = [], 0.0
+    for motion in motions:
+        driving = motion.driving.copy()
+        for begin, force, forearm in zip(pushes.start - offset, pushes.force, pushes.forearm, strict=True):
+            for i in np.flatnonzero((motion.time >= begin) & (motion.time < begin + 0.1)):
+                kin = panda_model.kinematics(motion.q[i])
+                link = panda_model.link_index("panda_link4")
+                wrist = kin.position[panda_model.link_index("panda_link5")]
+                J = panda_model.jacobian(kin, link, wrist) if forearm else panda_model.ee_jacobian(kin)
+                driving[i] -= J[:3].T @ force
+        spoilt.append(replace(run_of(motion), torque=driving))
+        offset += motion.time[-1] - motion.time[0] + 1.0
+    oracle = stream_of(FRANKA, spoilt, panda_model).recording.tau_ext
+    np.testing.assert_allclose(pushed(stream, pushes).recording.tau_ext, oracle, atol=1e-3)
+
+
+def test_pushes_keep_clear_of_contacts_and_of_the_ends_of_runs(stream):
+    time, label = stream.recording.time, np.zeros(len(stream.run), np.int64)
+    label[(time > 2.0) & (time < 2.5)] = 1
+    start = starts(replace(stream, label=label), [0, 2], 0.5, seed=0)
+    runs = stream.run[np.searchsorted(time, start)]
+    assert set(runs.tolist()) == {0, 2}
+    assert not ((start > 1.6) & (start < 2.9)).any()
+    for run in (0, 2):
+        own = time[stream.run == run]
+        assert start[runs == run].min() > own[0] + 0.5
+        assert start[runs == run].max() < own[-1] - 0.4
+
+
+def test_the_direction_told_least_of_gives_less_than_any_other(stream, panda_model):
+    at, spread = np.array([3.0]), np.diag([1.0, 2.0, 1.0, 2.0, 0.5, 0.5, 0.1])
+    force = told_least(stream, at, np.array([10.0]), spread).force[0]
+    q = stream.recording.q[np.searchsorted(stream.recording.time, 3.0)]
+    J = panda_model.ee_jacobian(panda_model.kinematics(q))[:3]
+
+    def squares(direction):
+        return (J.T @ direction) @ np.linalg.solve(spread, J.T @ direction)
+
+    others = np.random.default_rng(0).normal(size=(200, 3))
+    assert np.linalg.norm(force) == pytest.approx(10.0)
+    assert all(squares(force) <= squares(10.0 * other / np.linalg.norm(other)) for other in others)
+
+
+def test_five_sigma_is_five_times_the_rms_of_the_half_to_learn_from(stream):
+    tau = np.zeros_like(stream.recording.tau_ext)
+    tau[:, 2] = np.where(np.arange(len(tau)) % 2, 0.3, -0.3)  # an rms of 0.3 Nm, the bound is 1.5 Nm
+    quiet = replace(stream, recording=replace(stream.recording, tau_ext=tau))
+    tau = tau.copy()
+    at = np.flatnonzero((stream.recording.time >= 2.0) & (stream.recording.time < 2.1))
+    tau[at, 2] = 1.6
+    tau[at + 250, 2] = 1.4
+    played = five_sigma(quiet)(replace(stream.recording, tau_ext=tau))
+    assert played.time[played.alarm][[0, -1]] == pytest.approx([2.005, 2.095], abs=0.01)
+
+
+def test_the_classifier_finds_pushes_in_noise_and_no_noise_alone(stream):
+    random = np.random.default_rng(1)
+    noise = random.normal(0.0, 0.3, stream.recording.tau_ext.shape)
+    noisy = replace(stream, recording=replace(stream.recording, tau_ext=noise))
+    play = learnt(noisy.only([0, 1]))
+    other = noisy.only([2, 3])
+    start = starts(other, [2, 3], 2.0, seed=5)
+    touched = pushed(other, in_any_direction(start, 40.0, seed=6))
+    untouched = play(other.recording)
+    assert untouched.alarm.mean() < 0.01
+    found = [delay for delay in delays(in_any_direction(start, 40.0, 6), untouched, play(touched.recording)) if delay]
+    assert len(found) >= 0.8 * len(start)
+    assert 0.02 < np.median(found) < 0.1
+
+
+def test_features_of_a_window_by_hand():
+    tau = np.zeros((30, 1))
+    tau[20:] = 1.0
+    mean, spread, least, most, newest, step, largest, *bands = features(tau)[0]
+    assert [mean, spread] == pytest.approx([1 / 3, np.sqrt(2) / 3])
+    assert [least, most, newest, step, largest] == pytest.approx([0.0, 1.0, 1.0, 1 / 29, 1.0])
+    # Parseval: twice the power of the frequencies, the highest once, is 30 times the sum of squares about the mean
+    assert 2.0 * np.exp(bands).sum() == pytest.approx(30.0 * 30.0 * 2.0 / 9.0, rel=0.01)
+    tau[3] = np.nan
+    assert np.isnan(features(tau)).sum() == 9  # all but the newest
+
+
+def test_the_table_has_a_row_for_each_set_and_detector_and_one_for_all_sets():
+    row = {"detector": "a", "by": "somebody else's program", "free_s": 1800.0, "false_alarms": 1, "stated_n": []}
+    for name in ("15n", "30n", "stated"):
+        row |= {f"pushes_{name}": 0, f"delays_{name}_ms": []}
+    row |= {"contacts": 0, "delays_contacts_ms": [], "pushes_15n": 4, "delays_15n_ms": [20.0, 30.0, 70.0]}
+    other = row | {"free_s": 1800.0, "false_alarms": 0, "contacts": 2, "delays_contacts_ms": [9.0], "stated_n": [30.0]}
+    (whole,) = tables([{"set": "x"} | row, {"set": "y"} | other, {"set": "y"} | other | {"detector": "b"}])
+    # Garwood's bounds of one event: 0.0253 and 5.572, in half an hour
+    assert whole.rows[0] == ("x", "a", "30.0", "2 (0-11)", "3/4", "30, 62", "0/0", "-", "-", "-")
+    assert whole.rows[1][3:] == ("0 (0-7)", "3/4", "30, 62", "0/0", "30", "-", "1/2")
+    assert whole.rows[3] == ("all", "a", "60.0", "1 (0-6)", "6/8", "30, 70", "0/0", "30", "-", "1/2")
+    assert len(whole.rows) == 4
+
+
+def test_the_page_has_the_table_of_the_rows_beside_it():
+    results = Path(__file__).parents[3] / "docs/results"
+    lines = (results / "data/real-arms.jsonl").read_text(encoding="utf-8").splitlines()
+    (whole,) = tables([json.loads(line) for line in lines])
+    assert markdown(whole, 2) in (results / "real-recordings.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
-def test_the_whole_command_writes_a_row_for_each_set_table_and_detector(folder, tmp_path, capsys):
+def test_the_whole_command_writes_a_row_for_each_set_and_detector(folder, tmp_path, capsys):
     (folder / "lwr4.npz").write_bytes(b"")
     place, out = tmp_path / "rows.json", str(tmp_path / "out")
-    words = ["bench", "real", str(folder), "--detectors", "pretouch,fixed", "--json", str(place), "--out", out]
+    words = ["bench", "real", str(folder), "--detectors", "pretouch,five-sigma", "--json", str(place), "--out", out]
     assert cli.main(words) == 0
-    numbers, kinds = json.loads(place.read_text()), ("free", "contacts")
     assert "lwr4 is left out, for" in capsys.readouterr().err
-    rows = {(row["set"], kind, row["detector"]): row[kind] for row in numbers["rows"] for kind in kinds if kind in row}
-    sets = [("franka_fast", "free"), ("contactInterpretation", "free"), ("contactInterpretation", "contacts")]
-    assert set(rows) == {(*each, detector) for each in sets for detector in ("pretouch", "fixed")}
-    row = rows["contactInterpretation", "contacts", "pretouch"]
-    assert (row["found"], row["contacts"], row["link_right"], row["false_alarms"]) == (3, 3, 3, 0)
-    assert 0.0 < row["median_delay_ms"] < 100.0
-    assert rows["franka_fast", "free", "pretouch"]["contacts"] == 0
+    rows = {(row["set"], row["detector"]): row for row in json.loads(place.read_text())["rows"]}
+    assert set(rows) == {(s, d) for s in ("franka_fast", "contactInterpretation") for d in ("pretouch", "five-sigma")}
+    row = rows["contactInterpretation", "pretouch"]
+    assert (len(row["delays_contacts_ms"]), row["contacts"], row["link_right"], row["false_alarms"]) == (3, 3, 3, 0)
+    assert 0.0 < np.median(row["delays_contacts_ms"]) < 100.0
+    assert row["pushes_stated"] == len(row["stated_n"]) == row["pushes_15n"]
+    assert rows["contactInterpretation", "five-sigma"]["pushes_stated"] == 0
 
 
 def test_a_folder_without_a_set_says_what_was_looked_for_and_where_it_comes_from(tmp_path, capsys):

@@ -1,5 +1,4 @@
 import json
-from functools import partial
 
 from pretouch import cli
 from pretouch_lab.bench import shield
@@ -35,19 +34,3 @@ def test_each_benchmark_plays_all_that_it_says(monkeypatch, tmp_path):
     for name in ("localization", "detection", "avoidance"):
         assert cli.main(["bench", name, "--quick", "--out", str(tmp_path / name)]) == 130
     assert counts == {"localization": 6, "detection": 23, "avoidance": 123}
-
-
-def test_bench_both_says_which_goals_were_reached(monkeypatch, capsys, tmp_path):
-    def nothing(name, options):
-        about = {"bench": name, "quick": options.quick, "seeds": options.seeds}
-        return {"about": about, "rows": [], "paired": [], "families": []}
-
-    for name in ("detection", "avoidance"):
-        monkeypatch.setattr(benchmarks, name, partial(nothing, name))
-    out = tmp_path / "run"
-    out.mkdir()
-    assert cli.main(["bench", "both", "--quick", "--seeds", "development", "--out", str(out)]) == 0
-    assert capsys.readouterr().out.count("not measured") == 14
-    text = (out / "tables.md").read_text()
-    assert "detection quick, development seeds, avoidance quick" in text
-    assert "What happens when it touches something" in text

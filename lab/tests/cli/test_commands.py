@@ -79,7 +79,7 @@ def test_bad_input_ends_with_one_sentence_and_code_2(capsys, tmp_path, monkeypat
 
 @pytest.mark.parametrize(
     ("command", "name"),
-    [("reproduce static", "../link/run.json"), ("reproduce all", "tables.md"), ("bench both", "detection/rows.jsonl")],
+    [("reproduce static", "../link/run.json"), ("reproduce all", "tables.md"), ("bench shield", "rows.jsonl")],
 )
 def test_the_runs_own_files_are_not_overwritten(capsys, tmp_path, command, name):
     out = tmp_path / "out"

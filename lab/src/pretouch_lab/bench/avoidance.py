@@ -2,9 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import inf, isnan, nan
-
-import numpy as np
+from math import inf
 
 from pretouch.errors import ExperimentError
 from pretouch.profiles import profile
@@ -14,17 +12,9 @@ from pretouch_lab.bench.avoidance_scenes import scenarios, setting
 from pretouch_lab.bench.contenders import ABLATED, ABLATED_IN, ABLATED_SEEDS, AVOIDANCE, BASE, WITHOUT, profile_text
 from pretouch_lab.bench.scenes import SeedRange
 from pretouch_lab.run import Cell, Play, Row
-from pretouch_lab.table import Column, finite, grouped, median_bounds, summary, table
+from pretouch_lab.table import Column, grouped, summary, table
 from pretouch_lab.trial import play
 
-PAIRED = (
-    ("static", "blind", "peak_estimate_n"),
-    ("static", "blind", "true_peak_20ms_n"),
-    ("static", "paper-off", "first_contact_s"),
-    ("person", "paper-off", "cycle_time_s"),
-    ("person", "paper", "cycle_time_s"),
-)
-"""Family, reference and measure of each goal of `pretouch`."""
 _TOTALS = ("contact", "holds", "livelocks", "reactions", "false_reactions", "towards_person")
 _NOTE = (
     "Medians over the seeds, 10-90 % below. hit: trials with contact. least: least true distance of the surfaces."
@@ -120,8 +110,8 @@ def summarise(rows: list[Row]) -> Row:
     """Summarise trials.
 
     Returns:
-        `cells`, one for each scenario and contender; `families`, all scenarios of a family together; `ablations`, cells
-        of `pretouch` unchanged and with one switch off at a time, on the same seeds; `paired`.
+        `cells`, one for each scenario and contender; `ablations`, cells of `pretouch` unchanged and with one switch off
+        at a time, on the same seeds.
     """
     ended = [row | {"cycle_time_s": _ended(row, "cycle_time_s") if row["timed"] else None} for row in rows]
     off = [row for row in ended if row["contender"].startswith(WITHOUT)]
@@ -130,43 +120,13 @@ def summarise(rows: list[Row]) -> Row:
     on = [row for row in whole if row["contender"] == BASE and (row["scenario"], row["seed"]) in played]
     return {
         "cells": summary(whole, ("scenario", "family", "contender"), _SPREAD, _TOTALS),
-        "families": summary(whole, ("family", "contender"), _SPREAD, _TOTALS),
         "ablations": summary(on + off, ("scenario", "family", "contender"), _SPREAD, _TOTALS),
-        "paired": paired(whole),
     }
 
 
 def _ended(row: Row, measure: str) -> float:
     """Return a time [s]; infinite without an end."""
     return inf if row[measure] is None else float(row[measure])
-
-
-def paired(rows: list[Row]) -> list[Row]:
-    """Return the median ratio of `pretouch` to a reference for each measure of `PAIRED`, with 95 % bounds.
-
-    A family's scenarios and seeds count together. A force counts if the reference touched; without contact the force
-    of `pretouch` is 0. A time counts if one of the two ended; a time without an end is infinite, in the result None.
-    """
-    every = []
-    for family, reference, measure in PAIRED:
-        of = {(row["scenario"], row["seed"]): row for row in rows if row["contender"] == reference}
-        own = [row for row in rows if row["contender"] == BASE and row["family"] == family]
-        pairs = [(of[key], row) for row in own if (key := (row["scenario"], row["seed"])) in of]
-        parts = [part for theirs, ours in pairs if not isnan(part := _part(theirs, ours, measure))]
-        if parts:
-            low, high = median_bounds(parts)
-            middle = np.percentile(parts, 50, method="higher")  # no mean with an infinite value
-            numbers = {"part": finite(middle), "low": finite(low), "high": finite(high), "trials": len(parts)}
-            every.append({"family": family, "contender": BASE, "reference": reference, "measure": measure} | numbers)
-    return every
-
-
-def _part(theirs: Row, ours: Row, measure: str) -> float:
-    """Return the ratio of a measure to the reference's; NaN if it does not count."""
-    if measure.endswith("_s"):
-        whole = _ended(theirs, measure)
-        return _ended(ours, measure) / whole if whole else nan
-    return (ours[measure] or 0.0) / theirs[measure] if theirs["contact"] and theirs[measure] else nan
 
 
 def tables(summary: Row) -> list[TextTable]:

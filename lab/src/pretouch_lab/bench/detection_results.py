@@ -11,7 +11,7 @@ from pretouch_lab.bench.contenders import DETECTORS, Contender, ablated
 from pretouch_lab.bench.detection import BUSY, FAMILIES, sweep_values
 from pretouch_lab.bench.scenes import scenario
 from pretouch_lab.run import Row
-from pretouch_lab.table import dispersion_of, median_bounds, rate_bounds, rounded
+from pretouch_lab.table import dispersion_of, rate_bounds, rounded
 
 GOAL_FREE, GOAL_CONTACTS = "free: goal", "contacts: goal"
 """Scenarios of the goals: the nominal arm at the goal's speed, with any bystander; contacts with a goal of delay, on
@@ -119,7 +119,6 @@ def delays(every: list[float | None]) -> Row:
     return {
         "median_delay_s": rounded(float(np.median(at)), 4) if at else None,
         "p95_delay_s": rounded(float(np.percentile(at, 95)), 4) if at else None,
-        "median_bounds_s": [rounded(bound, 4) for bound in median_bounds(at)] if at else None,
         "missed": len(countable) - len(at),
         "contacts": len(countable),
         "busy": len(every) - len(countable),

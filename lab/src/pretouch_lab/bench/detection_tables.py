@@ -10,7 +10,6 @@ from pretouch_lab.bench.detection_results import (
     HARD,
     HARD_CONTACTS,
 )
-from pretouch_lab.bench.goals import find
 from pretouch_lab.bench.scenes import scenario
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, short, table
@@ -64,6 +63,12 @@ def tables(results: Row) -> list[TextTable]:
         ),
     ]
     return [each for each in every if each.rows]
+
+
+def find(rows: list[Row], detector: str, name: str, visible: bool | None = None) -> Row | None:
+    """Return a detector's row of a scenario, or None."""
+    where = {"contender": detector, "scenario": name} | ({} if visible is None else {"seen": visible})
+    return next((row for row in rows if where.items() <= row.items()), None)
 
 
 def _texts(name: str, free: Row | None, visible: Row | None, hidden: Row | None) -> Row:

@@ -30,7 +30,7 @@ FORCES_N = (15, 30)
 """Forces of the pushes [N]."""
 _EVERY_S = 4.0
 """Time between two pushes [s]: they are so rare that they hardly change what a detector learns."""
-_PHASES = 2
+_PHASES = 4
 """Number of plays with pushes of a force, each with its own instants and directions."""
 _AFTER_S = 0.1
 """Time after a push or a contact in which an alarm still belongs to it, and none is false [s]."""

@@ -17,7 +17,6 @@ class Bench:
         | Annotated[options.AvoidanceOptions, tyro.conf.subcommand("avoidance")]
         | Annotated[options.LocalizationOptions, tyro.conf.subcommand("localization")]
         | Annotated[options.ShieldOptions, tyro.conf.subcommand("shield")]
-        | Annotated[options.BothOptions, tyro.conf.subcommand("both")]
         | Annotated[options.CycleOptions, tyro.conf.subcommand("cycle")]
         | Annotated[options.CalibrationOptions, tyro.conf.subcommand("calibration")]
         | Annotated[options.RealOptions, tyro.conf.subcommand("real")]

@@ -1,7 +1,6 @@
 """Benchmarks of `pretouch bench`: play missing trials, print and write tables, and return the numbers."""
 
 import sys
-from dataclasses import fields
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
@@ -30,12 +29,11 @@ from pretouch_lab.bench import shield as shielding
 from pretouch_lab.bench.avoidance_scenes import PANDA, arm, place
 from pretouch_lab.bench.detection_results import results
 from pretouch_lab.bench.detection_tables import tables
-from pretouch_lab.bench.goals import front_table, goal_table
 from pretouch_lab.bench.real_sets import files_digest as sets_digest
 from pretouch_lab.bench.real_sets import sets_in
 from pretouch_lab.bench.scenes import checksums
 from pretouch_lab.bench.workload import LARGEST_SKIN
-from pretouch_lab.cli.playing import begin, check_numbers, played, report
+from pretouch_lab.cli.playing import begin, played, report
 from pretouch_lab.domain_randomisation import folder_part, sentence
 from pretouch_lab.run import Row, plays_of
 
@@ -100,17 +98,6 @@ def shield(options: lab_options.ShieldOptions) -> dict[str, Any]:
     out, trials = _folder(options, "shield"), shielding.plays(options.seeds, options.quick)
     rows = shielding.results(played("shield", shielding.trial, trials, out, options))
     return _finished(options, "shield", out, shielding.tables(rows), rows=rows)
-
-
-def both(options: lab_options.BothOptions) -> dict[str, Any]:
-    """See its options."""
-    out = options.folder(f"bench{folder_part(options.world)}{'-quick' if options.quick else ''}")
-    check_numbers(options, out)
-    shared = {each.name: getattr(options, each.name) for each in fields(lab_options.InWorlds)} | {"json": None}
-    detected = detection(lab_options.DetectionOptions(**shared | {"out": str(out / "detection")}))
-    avoided = avoidance(lab_options.AvoidanceOptions(**shared | {"out": str(out / "avoidance")}))
-    report([goal_table(detected, avoided), front_table(detected, avoided)], [], out)
-    return {"detection": detected, "avoidance": avoided}
 
 
 def real(options: lab_options.RealOptions) -> dict[str, Any]:
