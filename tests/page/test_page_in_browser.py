@@ -76,9 +76,7 @@ def test_a_hand_dragged_into_the_arm_leads_to_a_reaction_and_back_and_the_camera
         simulation.move_hand(at)
         visitor.wait_for("mode", Mode.REACT.name)
         visitor.keep(f"reacting-{touch}", tmp_path)
-        visitor.tab("Hand")
-        visitor.type("x [m]", 1.2)
-        visitor.wait_until(lambda: simulation.hand_target[0] == 1.2)
+        simulation.move_hand(np.array([1.2, *at[1:]]))
         visitor.wait_for("mode", Mode.TRACK.name)
         # beside hand and arm, which turns the camera
         visitor.drag(np.array([0.3, -0.6, 0.1]), np.array([0.3, -0.4, 0.3]), touch)

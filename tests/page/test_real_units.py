@@ -6,7 +6,6 @@ import pytest
 from pretouch.errors import ParameterError
 from pretouch.page.live import LivePage
 from pretouch.page.real_units import RealUnits
-from pretouch.page.room import Faults
 from pretouch.page.simulation import LiveSimulation
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
@@ -97,7 +96,7 @@ def test_an_arm_with_real_units_goes_while_they_are_heard_and_holds_when_they_ar
 def test_real_units_cannot_be_made_to_fail_but_can_be_reset(room, real):
     simulation = LiveSimulation(real=real)
     with pytest.raises(ParameterError, match="units are real: unplug or cover one"):
-        simulation.set_faults(Faults(frozenset({"hand_left"})))
+        simulation.silence(frozenset({"hand_left"}))
     simulation.advance(0.5)
     room.hear()
     simulation.reset()

@@ -13,7 +13,7 @@ from tests.other_arm import copied_panda
 from pretouch.control.path import Circle
 from pretouch.errors import ParameterError
 from pretouch.importing.robot_import import ImportOptions, import_robot, write_folder
-from pretouch.page.room import HAND_FORCE_N, Faults, LiveSettings, Mouse, Room, at_depth, live_path, settings_for
+from pretouch.page.room import HAND_FORCE_N, LiveSettings, Mouse, Room, at_depth, live_path, settings_for
 from pretouch.page.simulation import LiveSimulation
 from pretouch.profiles import profile
 from pretouch.robot.description import robot_named
@@ -43,7 +43,7 @@ def test_an_unknown_arm_of_a_pandas_size_gets_a_pandas_circle(tmp_path):
 
 def test_a_silenced_unit_sends_no_touches_either(panda_model, paper_skin):
     one, *others = (replace(unit, touch=TouchPatch()) for unit in paper_skin.units[:2])
-    settings = LiveSettings(faults=Faults(silenced=frozenset({one.id})))
+    settings = LiveSettings(silenced=frozenset({one.id}))
     room = Room(settings, live_path(settings), panda_model, Skin([one, *others], panda_model))
     for _ in range(10):
         room.tick()

@@ -12,7 +12,7 @@ from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.loop import run
-from pretouch.page.room import HAND_FORCE_N, HAND_SPEED_M_S, Faults, LiveSettings, Mouse
+from pretouch.page.room import HAND_FORCE_N, HAND_SPEED_M_S, LiveSettings, Mouse
 from pretouch.page.simulation import LiveSimulation
 from pretouch.profiles import at_rate, profile
 from pretouch.robot.postures import brought_to
@@ -81,7 +81,7 @@ def commanded(session: LiveSimulation, pieces: list[float]) -> np.ndarray:
     for until, act in (
         (0.5, lambda: session.move_hand(np.array([0.6, 0.1, 0.3]))),
         (1.2, lambda: session.set_path("line")),
-        (2.0, lambda: session.set_faults(Faults(frozenset({session.skin.ids[2]}), 2.0, 0.01))),
+        (2.0, lambda: session.silence(frozenset({session.skin.ids[2]}))),
         (2.5, lambda: session.resume()),
     ):
         while len(steps) - 1 < round(until / 0.01):

@@ -5,7 +5,6 @@ import pytest
 from tests.page.sessions import ARMED_S, poke, set_speed
 
 from pretouch.errors import RecordingError
-from pretouch.page.room import Faults
 from pretouch.page.simulation import LiveSimulation
 from pretouch.profiles import PROFILES, profile
 from pretouch.recording.reader import open_recording
@@ -32,7 +31,7 @@ def switched(session: LiveSimulation) -> list:
     steps += poke(session)
     set_speed(session, 0.2)
     steps += session.advance(0.3)
-    session.set_faults(Faults(frozenset({session.skin.ids[1]})))
+    session.silence(frozenset({session.skin.ids[1]}))
     return steps + session.advance(0.7)
 
 

@@ -1,10 +1,7 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from tests.sim.ranging import CONE_MEAN, EXACT, FORWARD, NO_ERROR, Rig, ball, wall
 
-from pretouch.errors import ParameterError
 from pretouch.perception.scene_filter import ray_capsule
 from pretouch.sensing.sensor import Sensor
 from pretouch.sensing.skin import Skin
@@ -144,23 +141,6 @@ def test_a_silenced_unit_is_never_heard_again_and_the_others_are(rig):
     bench.finders.silenced.clear()
     bench.plant.advance(0.1)
     assert bench.finders.read().stamp[1] > 0.8
-
-
-def test_units_err_as_changed_from_then_on(rig):
-    bench = rig(wall(0.5), **EXACT, latency_s=0.0, jitter_s=0.0)
-    assert np.ptp(bench.collect(0.5)["distance"]) < 1e-6
-    bench.finders.change(replace(bench.finders.params, noise_floor_m=0.01, latency_s=0.1))
-    bench.plant.advance(0.2)
-    noisy = bench.collect(2.0)
-    assert noisy["distance"].std() == pytest.approx(0.01, rel=0.3)
-    assert (noisy["seen"] - noisy["stamp"]).min() > 0.099
-
-
-@pytest.mark.parametrize("mounted", [{"realistic": True}, {"rings": 3}, {"offset_max_m": 0.02}])
-def test_what_was_settled_when_the_units_were_mounted_stays(rig, mounted):
-    finders = rig(wall(0.5)).finders
-    with pytest.raises(ParameterError, match=f"{next(iter(mounted))} cannot change while the sensors run"):
-        finders.change(replace(finders.params, **mounted))
 
 
 @pytest.mark.parametrize(("gap", "status"), [(0.1, RangeStatus.OK), (0.35, RangeStatus.OK), (1.0, RangeStatus.SIGNAL)])

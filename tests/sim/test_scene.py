@@ -1,11 +1,8 @@
-from dataclasses import replace
-
 import mujoco
 import numpy as np
 import pytest
 
 from pretouch.robot.model import RobotModel
-from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import ArmError, Box, HandSpec, SceneSpec, build, fixtures
 from pretouch.types import FloatArray
@@ -127,19 +124,6 @@ def test_only_declared_pairs_touch(panda_model):
     pairs = [names(built, data, c) for c in range(data.ncon)]
     assert pairs
     assert all(len(pair & {"block", "floor", "hand"}) == 1 for pair in pairs)
-
-
-@pytest.mark.parametrize("stiffness", [30_000.0, 75_000.0, 150_000.0])
-def test_a_thing_that_is_stiffened_is_as_one_built_so(panda_model, stiffness):
-    block = Box("block", (1.0, 0.0, 0.5), (0.2, 0.2, 0.4), stiffness)
-    asked = SceneSpec(boxes=(block,), hand=HandSpec(stiffness=2 * stiffness))
-    other = SceneSpec(boxes=(replace(block, stiffness=1e4),), hand=HandSpec(stiffness=2e4))
-    q = panda_model.description.q_ready
-    plant = Plant(panda_model, other, PlantParams(), q, seed=0)
-    plant.stiffen("block", stiffness)
-    plant.stiffen("hand", 2 * stiffness)
-    built = Plant(panda_model, asked, PlantParams(), q, seed=0).mj_model
-    np.testing.assert_array_equal(plant.mj_model.pair_solref, built.pair_solref)
 
 
 def test_the_arm_differs_from_its_model_as_asked(panda_model):

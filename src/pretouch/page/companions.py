@@ -34,7 +34,7 @@ class Companion:
 class Companions:
     """Arms that go through the same control cycles as the page's own, and whose hands go where its hand is to go.
 
-    Each is a simulation of its own, at rest at first where its path begins, with the same seed, skin and faults.
+    Each is a simulation of its own, at rest at first where its path begins, with the same seed, skin and silent units.
     """
 
     def __init__(self, server: ViserServer, main: LiveSimulation) -> None:
@@ -84,10 +84,8 @@ class Companions:
         if simulation.settings.path != settings.path:
             simulation.set_path(settings.path)
             arm.scene.show_world(simulation.world)
-        if simulation.settings.stiffness != settings.stiffness:
-            simulation.set_stiffness(settings.stiffness)
-        if simulation.settings.faults != settings.faults:
-            simulation.set_faults(settings.faults)
+        if simulation.settings.silenced != settings.silenced:
+            simulation.silence(settings.silenced)
 
     def draw(self, now: float) -> None:
         """Show them at a time of the machine [s]."""

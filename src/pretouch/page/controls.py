@@ -13,12 +13,11 @@ from viser import GuiApi
 from pretouch.composition import differences, field_docs
 from pretouch.errors import RecordingError
 from pretouch.page.panel import SETTLE_S, ActionQueue, add_button, add_view_boxes, put, when_changed
-from pretouch.page.room import Faults, ObjectName, PathName
+from pretouch.page.room import ObjectName, PathName
 from pretouch.page.simulation import LiveSimulation
 from pretouch.params import TaskParams
 from pretouch.profiles import Profile, profile, profile_names
 from pretouch.sim.tcp_push import AXES
-from pretouch.types import FloatArray
 
 RECORDINGS = Path("runs")
 """Folder in which recordings are kept."""
@@ -40,8 +39,6 @@ class ClockState:
     paused: bool = False
     speed: float = 1.0
     """Simulated over real time."""
-    single: int = 0
-    """Number of control cycles to run one by one, paused or not."""
 
 
 def with_name(variant: Profile, base: str) -> Profile:
@@ -80,8 +77,6 @@ class Controls:
         """Add all other controls, each group folded; `show` shows or hides a part of the scene."""
         folders: dict[str, Callable[[], None]] = {
             "Push": self._push_folder,
-            "Hand": self._hand_folder,
-            "Clock": self._clock_folder,
             "Controller": self._controller_folder,
             "World": self._world_folder,
             "View": lambda: add_view_boxes(self._gui, self._actions, show),
@@ -96,20 +91,6 @@ class Controls:
         self._axis = gui.add_dropdown("Direction", tuple(AXES), initial_value="+y", hint="Of the base frame.")
         self._force = gui.add_slider("Force [N]", 5.0, 60.0, 1.0, PUSH_N)
         self._lasting = gui.add_slider("Duration [s]", 0.1, 3.0, 0.1, PUSH_S)
-
-    def _hand_folder(self) -> None:
-        low, high = self._simulation.room.mouse.lowest, self._simulation.room.mouse.highest
-        self._hand = [
-            self._gui.add_slider(f"{axis} [m]", float(low[k]), float(high[k]), 0.01, 0.0, hint="Or drag the hand.")
-            for k, axis in enumerate("xyz")
-        ]
-        for axis, slider in enumerate(self._hand):
-            when_changed(slider, self._actions, partial(self._move_hand, axis), f"hand {axis}", quiet=True)
-
-    def _clock_folder(self) -> None:
-        clock = self._gui.add_slider("Clock speed", *_CLOCK, 0.1, 1.0, hint="Simulated over real time.")
-        self._setting(clock, self._set_clock, "clock speed", lambda: self.running.speed, SETTLE_S)
-        self._button("Single step", self._single_step, color="gray", hint="One control cycle; pauses.")
 
     def _controller_folder(self) -> None:
         gui, hint = self._gui, field_docs(TaskParams)["speed_m_s"]
@@ -126,22 +107,17 @@ class Controls:
         self._setting(path, simulation.set_path, "path", lambda: simulation.settings.path)
         thing = gui.add_dropdown("Object", get_args(ObjectName), hint="Restarts at time 0.")
         self._setting(thing, lambda name: simulation.reset(object=name), "object", lambda: simulation.settings.object)
-        hint = "Of hand and object; changes as soon as nothing touches."
-        slider = gui.add_slider("Stiffness [kN/m]", 3.0, 150.0, 1.0, 75.0, hint=hint)
-        self._setting(slider, self._set_stiffness, "stiffness", lambda: simulation.settings.stiffness / 1e3, SETTLE_S)
+        clock = gui.add_slider("Clock speed", *_CLOCK, 0.1, 1.0, hint="Simulated over real time.")
+        self._setting(clock, self._set_clock, "clock speed", lambda: self.running.speed, SETTLE_S)
         if not simulation.real:
             with gui.add_folder("Sensor units"):
-                self._fault_controls()
+                self._unit_boxes()
 
-    def _fault_controls(self) -> None:
-        gui, units = self._gui, [unit.id for unit in self._simulation.skin.mounted]
-        self._units = {unit: gui.add_checkbox(unit, True, hint="Off: the unit is silent.") for unit in units}
+    def _unit_boxes(self) -> None:
+        units = [unit.id for unit in self._simulation.skin.mounted]
+        self._units = {unit: self._gui.add_checkbox(unit, True, hint="Off: the unit is silent.") for unit in units}
         for unit, box in self._units.items():
-            self._setting(box, self._set_faults, "faults", partial(self._hears, unit))
-        self._noise = gui.add_slider("Noise factor", 0.0, 20.0, 0.5, 1.0)
-        self._setting(self._noise, self._set_faults, "faults", lambda: self._faults.noise_factor, SETTLE_S)
-        self._latency = gui.add_slider("More latency [s]", 0.0, 0.5, 0.01, 0.0)
-        self._setting(self._latency, self._set_faults, "faults", lambda: self._faults.latency_s, SETTLE_S)
+            self._setting(box, self._silence, "silence", partial(self._hears, unit))
 
     def _setting(
         self,
@@ -165,10 +141,6 @@ class Controls:
         return self._simulation.settings.profile
 
     @property
-    def _faults(self) -> Faults:
-        return self._simulation.settings.faults
-
-    @property
     def _base(self) -> str:
         """Name of the profile that the session's was made from."""
         name = self._profile.name.partition(":")[0]
@@ -188,11 +160,8 @@ class Controls:
         variant = replace(variant, task=replace(variant.task, speed_m_s=speed))
         self._simulation.set_profile(with_name(variant, base))
 
-    def _set_stiffness(self, stiffness: float) -> None:
-        self._simulation.set_stiffness(1e3 * stiffness)
-
     def _hears(self, unit: str) -> bool:
-        return unit not in self._faults.silenced
+        return unit not in self._simulation.settings.silenced
 
     def _push(self) -> None:
         """Push the hand as the folder says; the notice tells what became of it."""
@@ -206,20 +175,11 @@ class Controls:
         """Let no time pass until somebody goes on."""
         self.running.paused, self._pause.label = True, "Go on"
 
-    def _single_step(self) -> None:
-        self.running.paused = True
-        self.running.single += 1
-
     def _set_clock(self, speed: float) -> None:
         self.running.speed = float(np.clip(speed, *_CLOCK))
 
-    def _move_hand(self, axis: int, value: float) -> None:
-        """Draw the hand along one axis from where it is to be; the sliders may show by now what was so before."""
-        self._simulation.move_hand(np.where(np.arange(3) == axis, value, self._simulation.hand_target))
-
-    def _set_faults(self, _: object) -> None:
-        silenced = frozenset(unit for unit, box in self._units.items() if not box.value)
-        self._simulation.set_faults(Faults(silenced, float(self._noise.value), float(self._latency.value)))
+    def _silence(self, _: object) -> None:
+        self._simulation.silence(frozenset(unit for unit, box in self._units.items() if not box.value))
 
     def refresh(self) -> None:
         """Have all controls show what holds, but for those that somebody types in: what was refused goes back.
@@ -241,11 +201,6 @@ class Controls:
         """Let the button to resume be pressed while a hold waits for it; else it says that none does."""
         if self._resume.disabled is possible:
             self._resume.disabled, self._resume.label = not possible, "Resume" if possible else _NO_RESUME
-
-    def show_hand(self, target: FloatArray) -> None:
-        """Have the sliders show where the hand is to be (3,) [m]."""
-        for slider, value in zip(self._hand, target.tolist(), strict=True):
-            put(slider, round(value, 2))
 
 
 def toggle_recording(simulation: LiveSimulation) -> None:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 
-import numpy as np
 from viser import ViserServer
 
 from pretouch.errors import PretouchError
@@ -16,7 +15,7 @@ from pretouch.page.plots import History, Plots
 from pretouch.page.scene import Scene
 from pretouch.page.server import ServeOptions, announce, served
 from pretouch.page.simulation import LiveSimulation
-from pretouch.types import ControlStep, FloatArray
+from pretouch.types import FloatArray
 
 _ARMS = ("one arm", "three arms")
 
@@ -33,8 +32,6 @@ class LivePage:
         self._server, self._simulation, self._say = server, simulation, say
         self._world, self._time = simulation.world, simulation.time
         self.pace, self.actions = Pace(), ActionQueue()
-        self._pointed: FloatArray | None = None
-        """Target of the hand by the sliders."""
         self._visited = False
         """True if anybody has opened the page: an opening waits until then."""
         self._companions: Companions | None = None
@@ -80,7 +77,7 @@ class LivePage:
             return
         recording, before = simulation.recording, simulation.time
         self.drive.turn()
-        steps = self._pass_time()
+        steps = [] if running.paused else simulation.advance(running.speed * PERIOD_S)
         late = simulation.frame.late(simulation.world.profile.sight.slow_after_s)
         for step in steps:
             self._history.add(step, late=late)
@@ -102,14 +99,6 @@ class LivePage:
             self.controls.refresh()
         if self._server.get_clients():
             self._draw(now)
-
-    def _pass_time(self) -> list[ControlStep]:
-        """Let the time of one update pass, or as many single steps as were asked for."""
-        running, simulation = self.controls.running, self._simulation
-        single, running.single = running.single, 0
-        if single:
-            return [simulation.single_step() for _ in range(single)]
-        return [] if running.paused else simulation.advance(running.speed * PERIOD_S)
 
     def _run_actions(self, now: float) -> None:
         simulation, actions = self._simulation, self.actions.take(now)
@@ -140,7 +129,6 @@ class LivePage:
         step, world = frame.step, self._world
         with self._server.atomic():
             motion = self._scene.draw(frame, now)
-            self._follow_target(self._simulation.hand_target)
             self.drive.draw(step)
             if self._companions:
                 self._companions.draw(now)
@@ -152,12 +140,6 @@ class LivePage:
             line = " · ".join(filter(None, (f"{step.stamp:.1f} s", rates, finds(step), recorded)))
             self.status.draw(step.mode, explanation, line, pace.sentence(), now)
             self.controls.offer_resume(resumable(step))
-
-    def _follow_target(self, target: FloatArray) -> None:
-        """Have the sliders show where the hand is to be, wherever that came from."""
-        if self._pointed is None or not np.array_equal(target, self._pointed):
-            self.controls.show_hand(target)
-            self._pointed = target.copy()
 
 
 def serve_live(

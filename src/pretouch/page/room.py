@@ -30,10 +30,6 @@ PathName = Literal["circle", "line"]
 ObjectName = Literal["none", "board -y", "board +y"]
 """Object in the arm's way: none, or the static experiment's board on one side."""
 
-Stiffness = Annotated[float, Check(low=3_000.0, high=150_000.0)]
-"""Stiffness of a contact with the arm [N/m]. On a softer one a hand that pushes hard sinks through a thin link; with a
-stiffer one a hand of 0.6 kg swings too quickly for physics in steps of 1 ms."""
-
 _SETTLE_S = 0.2
 """Time the arm stands before the controller starts [s]: the observer's transient is over."""
 HAND_SPEED_M_S = 0.8
@@ -51,18 +47,6 @@ the place's own depth counts."""
 
 
 @dataclass(frozen=True)
-class Faults(Checked):
-    """Faults of the sensor units."""
-
-    silenced: frozenset[str] = frozenset()
-    """Ids of the units that no longer send."""
-    noise_factor: Annotated[float, Check(low=0.0, high=20.0)] = 1.0
-    """Factor on the standard deviation of the readings."""
-    latency_s: Annotated[float, Check(low=0.0, high=1.0)] = 0.0
-    """Time by which readings arrive later than they do anyway [s]."""
-
-
-@dataclass(frozen=True)
 class LiveSettings(Checked):
     """Settings that a live session starts with, also after a reset."""
 
@@ -72,16 +56,12 @@ class LiveSettings(Checked):
     """Path of the end-effector."""
     object: ObjectName = "none"
     """Object in the way of the arm."""
-    stiffness: Stiffness = HandSpec.stiffness
-    """Stiffness of what the arm can touch, the person's hand and the object [N/m]."""
-    faults: Faults = field(default_factory=Faults)
-    """Faults of the sensor units."""
+    silenced: frozenset[str] = frozenset()
+    """Ids of the simulated units that do not send."""
     seed: Annotated[int, Check(low=0)] = 0
     """Decides the arm's errors and all noise."""
     plant: PlantParams = field(default_factory=PlantParams)
     """The kind of simulated arm."""
-    ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
-    """Errors of simulated units without faults."""
     hand_start: tuple[float, float, float] = (1.0, 0.5, 0.3)
     """Start of the person's hand [m], base frame: in view, and clear of both paths."""
     placement: Placement = field(default_factory=Placement)
@@ -167,17 +147,17 @@ class Room:
 
         With `real` units the arm carries those in place of simulated ones.
         """
-        q, hand = brought_to(model, path.point(0.0)), HandSpec(stiffness=settings.stiffness)
+        q, hand = brought_to(model, path.point(0.0)), HandSpec()
         boxes: tuple[Box, ...] = ()
         if settings.object != "none":
             side = settings.object.removeprefix("board ")
             face, met_by = settings.placement.face(FACE_M, side), settings.placement.hand(side)
-            boxes = (board_beside(path, side, settings.stiffness, face, hand=met_by),)
+            boxes = (board_beside(path, side, hand.stiffness, face, hand=met_by),)
         scene = SceneSpec(boxes=boxes, hand=hand)
         self.mouse = Mouse(np.array(settings.hand_start), scene, hand, settings.placement.scale)
         self.scene = replace(scene, hand=replace(hand, start=tuple(self.mouse.target.tolist())))
         self.plant = Plant(model, self.scene, settings.plant, q, settings.seed)
-        self._simulated = None if real else RangeFinders(self.plant, skin, settings.ranging, settings.seed)
+        self._simulated = None if real else RangeFinders(self.plant, skin, RangeFinderParams(), settings.seed)
         self.units: UnitPort = self._simulated or cast(RealUnits, real)
         if self._simulated and len(skin.touching):
             touch = TouchSensors(self.plant, skin, TouchErrors(), settings.seed)
@@ -185,35 +165,24 @@ class Room:
             self.units = SimulatedTouchSkin(self._simulated.read, touch.touch)
         self.hand = Hand(self.plant, self.mouse, PersonArm(speed_max=HAND_SPEED_M_S))
         self.clock = PlantClock(self.plant, settings.profile.task.control_period_s)
-        self.stiffness = self._next_stiffness = settings.stiffness
-        self._skin, self._nominal = skin, settings.ranging
-        self.set_faults(settings.faults)
+        self._skin = skin
+        self.silence(settings.silenced)
         self.plant.advance(_SETTLE_S)
         if real:
             real.begin(lambda: self.plant.time)
 
-    def set_faults(self, faults: Faults) -> None:
-        """Apply faults to the units from the next measurement on; an unknown id is a ParameterError.
-
-        So is any fault of real units.
-        """
+    def silence(self, units: frozenset[str]) -> None:
+        """Let units, by their ids, send nothing, and all others send; an unknown id, or a real unit's, is an error."""
         if self._simulated is None:
-            if faults != Faults():
+            if units:
                 raise ParameterError("These units are real: unplug or cover one to see what the arm does.")
             return
-        unknown = sorted(faults.silenced - set(self._skin.boards))
+        unknown = sorted(units - set(self._skin.boards))
         if unknown:
-            units = ", ".join(unit.id for unit in self._skin.mounted)
-            raise ParameterError(f"Unknown unit {', '.join(unknown)}: choose from {units}.")
+            choices = ", ".join(unit.id for unit in self._skin.mounted)
+            raise ParameterError(f"Unknown unit {', '.join(unknown)}: choose from {choices}.")
         self._simulated.silenced.clear()
-        self._simulated.silenced.update(i for i, name in enumerate(self._skin.boards) if name in faults.silenced)
-        sound, factor, latency = self._nominal, faults.noise_factor, self._nominal.latency_s + faults.latency_s
-        floor, rate = factor * sound.noise_floor_m, factor * sound.noise_rate
-        self._simulated.change(replace(sound, noise_floor_m=floor, noise_rate=rate, latency_s=latency))
-
-    def set_stiffness(self, stiffness: float) -> None:
-        """Give hand and object another stiffness [N/m], as soon as nothing touches."""
-        self._next_stiffness = stiffness
+        self._simulated.silenced.update(i for i, name in enumerate(self._skin.boards) if name in units)
 
     @property
     def touched(self) -> FloatArray | None:
@@ -223,8 +192,4 @@ class Room:
 
     def tick(self) -> float:
         """Let one control period pass and return the time [s]."""
-        if self._next_stiffness != self.stiffness and not self.plant.touching:
-            self.stiffness = self._next_stiffness
-            for thing in ("hand", *(box.name for box in self.scene.boxes)):
-                self.plant.stiffen(thing, self.stiffness)
         return self.clock.tick()

@@ -18,7 +18,7 @@ from pretouch.loop import Cycle, Options, turn
 from pretouch.page.frame import Frame, World
 from pretouch.page.opening import Opening
 from pretouch.page.real_units import RealUnits
-from pretouch.page.room import Faults, LiveSettings, PathName, Room, live_path
+from pretouch.page.room import LiveSettings, PathName, Room, live_path
 from pretouch.perception.local_map import LocalMap
 from pretouch.profiles import Profile
 from pretouch.recording.simulation import surroundings, truth_of
@@ -167,15 +167,10 @@ class LiveSimulation:
         if name != self.settings.path:
             self._replace_controller(replace(self.settings, path=cast(PathName, name)))
 
-    def set_stiffness(self, stiffness: float) -> None:
-        """Give the person's hand and the object another stiffness [N/m], as soon as nothing touches."""
-        self.settings = replace(self.settings, stiffness=stiffness)
-        self.room.set_stiffness(stiffness)
-
-    def set_faults(self, faults: Faults) -> None:
-        """Apply faults to the units; an unknown id, and any fault of real units, is a ParameterError."""
-        self.room.set_faults(faults)
-        self.settings = replace(self.settings, faults=faults)
+    def silence(self, units: frozenset[str]) -> None:
+        """Let units, by their ids, send nothing; an unknown id, and any of a real unit, is a ParameterError."""
+        self.room.silence(units)
+        self.settings = replace(self.settings, silenced=units)
 
     def push(self, force: FloatArray, duration: float) -> None:
         """Push the robot's hand with a force (3,) [N], base frame, for a time [s]; the notice tells the outcome."""
@@ -248,6 +243,5 @@ class LiveSimulation:
             "path": settings.path,
             "units": "real" if self.real else "simulated",
             "object": settings.object,
-            "stiffness_n_m": self.room.stiffness,
             "scene": described(self.room.scene),
         }

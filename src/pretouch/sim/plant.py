@@ -15,7 +15,7 @@ from pretouch.sim.observer import wrench_from_torques
 from pretouch.sim.physics import BIAS, QD_BEFORE, QD_D, HandMemory, memory_of, take_steps
 from pretouch.sim.plant_params import Joints, PlantParams
 from pretouch.sim.rays import Ranging
-from pretouch.sim.scene import ArmError, SceneSpec, build, stiffen
+from pretouch.sim.scene import ArmError, SceneSpec, build
 from pretouch.sim.under_way import ROUNDING_S
 from pretouch.types import FloatArray, RobotState
 
@@ -254,14 +254,6 @@ class Plant(ArmInWorld):
             return False
         self._ready, self._chance = ready, rng
         return True
-
-    def stiffen(self, thing: str, stiffness: float) -> None:
-        """Give the contacts with a thing of the scene, by name, another stiffness [N/m].
-
-        To be done while nothing is `touching`: a spring that is stiffened while compressed gives more energy than it
-        took.
-        """
-        stiffen(self.mj_model, thing, stiffness, self.scene.damping_ratio)
 
     def advance(self, duration: float) -> None:
         """Let time pass [s], in whole physics steps."""

@@ -7,7 +7,6 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
-from pretouch.errors import ParameterError
 from pretouch.sensing.sensor import Capacitive, Sensor, cone_rays
 from pretouch.sensing.skin import Skin
 from pretouch.sim.capacitive import STREAM, Electrode
@@ -15,7 +14,7 @@ from pretouch.sim.flaws import flaw_arrays, flaws_of
 from pretouch.sim.plant import ArmInWorld
 from pretouch.sim.rays import Finders, Ranging, deliver, geoms_of, measure
 from pretouch.sim.under_way import ROUNDING_S
-from pretouch.types import FloatArray, RangeReadings, RangeStatus
+from pretouch.types import RangeReadings, RangeStatus
 
 
 @dataclass(frozen=True)
@@ -97,7 +96,7 @@ class RangeFinders:
         With `send`, that is handed each measurement as it is made and has to bring it to where it is read: latency,
         jitter and dropout are not these sensors' then, and `read` tells nothing. They measure the same either way.
         """
-        self._plant, self._skin, self.params = plant, skin, params
+        self._plant, self.params = plant, params
         count, data, rays = len(skin), plant.mj_data, 1 + 3 * params.rings * (params.rings + 1)
         cones = np.array([cone_rays(params.rings, unit.sensor.angle) for unit in skin.units]).reshape(count, rays, 3)
         self._rng = np.random.default_rng([seed, 3])
@@ -122,7 +121,7 @@ class RangeFinders:
             for k, unit in enumerate(skin.units)
             if isinstance(unit.sensor, Capacitive)
         }
-        period = self._all_periods()
+        period = np.array([params.period_of(unit.sensor) for unit in skin.mounted])
         self._ranging = Ranging(
             p=params.numbers,
             finders=finders,
@@ -142,20 +141,6 @@ class RangeFinders:
         """Indices of units that no longer send."""
         if self._ranging.whole or not plant.measure_each_step(self._ready, self._rng):
             plant.before_each_step(self._sample)
-
-    def _all_periods(self) -> FloatArray:
-        """Time between readings of each unit (B,), all of its zones together [s]."""
-        return np.array([self.params.period_of(unit.sensor) for unit in self._skin.mounted])
-
-    def change(self, params: RangeFinderParams) -> None:
-        """Err in another way from the next measurement on; what was settled when they were mounted has to stay."""
-        for name in ("rings", "offset_max_m", "realistic"):
-            if getattr(params, name) != getattr(self.params, name):
-                raise ParameterError(
-                    f"RangeFinderParams.{name} cannot change while the sensors run: create them again."
-                )
-        self.params = params
-        self._ranging = self._ranging._replace(p=params.numbers, period=self._all_periods())
 
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit that has arrived by now."""
