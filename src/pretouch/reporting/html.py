@@ -49,7 +49,6 @@ body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(
 main { max-width: 68rem; margin: 2rem auto; padding: 0 1.2rem; }
 h1 { font-size: 1.7rem; line-height: 1.2; } h2 { font-size: 1.35rem; overflow-wrap: anywhere; }
 h1, h2 { margin: 0 0 .6rem; } h3 { font-size: 1.08rem; margin: 2rem 0 .5rem; } h4 { margin: 1rem 0 .3rem; }
-section { border-top: 2px solid var(--ink); margin-top: 2.5rem; padding-top: 1rem; }
 .summary { font-size: 1.05rem; max-width: 52rem; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .82rem; margin: .5rem 0; font-variant-numeric: tabular-nums; }
@@ -62,10 +61,10 @@ th { font-weight: 600; } thead th { vertical-align: bottom; color: var(--soft); 
 .vector { white-space: pre; } .note, figcaption, footer { color: var(--soft); font-size: .82rem; max-width: 52rem; }
 .bad { color: var(--bad); font-weight: 600; } .other { background: var(--other); padding: 0 .3rem; }
 figure { margin: 1rem 0; } figure img { max-width: 100%; height: auto; background: #fff; }
-a { color: inherit; } footer { border-top: 1px solid var(--line); margin-top: 2.5rem; padding-top: .5rem; }
+footer { border-top: 1px solid var(--line); margin-top: 2.5rem; padding-top: .5rem; }
 @media print {
-  body { font-size: 10pt; } main { max-width: none; margin: 0; } section { break-before: page; }
-  section:first-of-type { break-before: auto; } figure, tr { break-inside: avoid; } h3 { break-after: avoid; }
+  body { font-size: 10pt; } main { max-width: none; margin: 0; }
+  figure, tr { break-inside: avoid; } h3 { break-after: avoid; }
   .scroll { overflow: visible; }
 }
 """
@@ -92,11 +91,10 @@ def joined(parts: Iterable[Text], between: str = "\n") -> Html:
     return Html(between.join(html(part) for part in parts))
 
 
-def element(name: str, content: Text, kind: str = "", anchor: str = "") -> Html:
-    """One element with a class and an id."""
-    attributes = f' class="{escape(kind)}"' if kind else ""
-    attributes += f' id="{escape(anchor)}"' if anchor else ""
-    return Html(f"<{name}{attributes}>{html(content)}</{name}>")
+def element(name: str, content: Text, kind: str = "") -> Html:
+    """One element with a class."""
+    attribute = f' class="{escape(kind)}"' if kind else ""
+    return Html(f"<{name}{attribute}>{html(content)}</{name}>")
 
 
 def bad(text: Text) -> Html:

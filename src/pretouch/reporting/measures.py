@@ -293,7 +293,7 @@ class Measures:
     """One recording, measured: what the sections of a report are written from."""
 
     title: str
-    """Name of the file, with its folder where another file has the same name."""
+    """Name of the file."""
     lacking: str
     """Sentence on the missing part of an incomplete file, or ''."""
     course: RunCourse

@@ -1,6 +1,6 @@
-"""The pages, one HTML file each with all in it: a report of recordings, and what `pretouch detect` found in one."""
+"""The pages, one HTML file each with all in it: a report of a recording, and what `pretouch detect` found in one."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -11,37 +11,24 @@ from pretouch.reporting import measures
 from pretouch.reporting.contacts import ContactMeasures, contact_section
 from pretouch.reporting.figures import close_up_figure, force_figure, motion_figure, picture, style
 from pretouch.reporting.health import health_section
-from pretouch.reporting.html import Html, Row, Text, bad, document, element, joined, number, percent, table, table_html
+from pretouch.reporting.html import Html, Text, bad, document, element, joined, percent, table_html
 from pretouch.reporting.measures import Measures
-from pretouch.reporting.record import RunCourse, spread
+from pretouch.reporting.record import RunCourse
 from pretouch.reporting.setting import parameter_section, setting_section, started
 from pretouch.text_table import TextTable
-from pretouch.types import FloatArray, Mode
+from pretouch.types import Mode
 
 _SHADED = "Red: REACT, grey: HOLD."
 
 
-def page(recordings: Iterable[Measures]) -> str:
-    """Make the page of one recording or several; of each no more than its text is kept."""
-    title, rows, sections = "", list[Row](), list[Html]()
-    for order, m in enumerate(recordings, 1):
-        rows.append(_compared(order, m))
-        with style():
-            sections.append(element("section", joined(_recording(m)), anchor=f"recording-{order}"))
-        title = m.title
-    head = [element("h1", "Pretouch report")]
-    if len(rows) > 1:
-        title = f"{len(rows)} recordings"
-        note = (
-            "Delay, filtered and raw: medians, of forces the norm at the detection. Largest force: the true one where"
-            " it is known (*), else the estimate during a contact."
-        )
-        head.append(table(rows, note, 2))
-    return document(f"Pretouch report: {title}", joined([*head, *sections]))
+def page(m: Measures) -> str:
+    """Make the page of a recording."""
+    with style():
+        body = joined([element("h1", "Pretouch report"), *_recording(m)])
+    return document(f"Pretouch report: {m.title}", body)
 
 
 def _recording(m: Measures) -> list[Text]:
-    """All about one recording."""
     course = m.course
     forces = (
         "Force on the arm and contact thresholds by axis, base frame; evidence, a contact from 1 on."
@@ -155,39 +142,6 @@ def _nearest(course: RunCourse) -> str:
         return "Nothing was sensed near the arm."
     where = f"{nearest.name}, at {nearest.time:.1f} s"
     return f"The nearest obstacle sensed was {nearest.distance:.3f} m from the body ({where})."
-
-
-def _compared(order: int, m: Measures) -> Row:
-    """Return the row of a recording in the comparison; `order` counts the recordings of the page from 1."""
-    link = Html(f'<a href="#recording-{order}">{element("span", m.title)}</a>')
-    c, body, fastest, modes = (
-        m.contacts,
-        measures.nearest_to_body(m.course),
-        spread(m.course.speed),
-        measures.time_in_modes(m.course),
-    )
-    steps = [d.step for d in c.detections]
-    return {
-        "recording": joined([link, bad(" (incomplete)")], "") if m.lacking else link,
-        "profiles": ", ".join(m.course.profile_names),
-        "duration [s]": number(float(m.course.lasted.sum()), 1),
-        "contacts": str(len(c.detections)),
-        "missed": str(len(c.missed)) if c.truth_known else "?",
-        "without touch": str(len(c.without_touch)) if c.truth_known else "?",
-        "delay [ms]": number(float(np.median(c.delays)) if c.delays else None, 0, 1000.0),
-        "filtered [N]": number(_median_norm(m.course.filtered_force[steps]), 1),
-        "raw [N]": number(_median_norm(m.course.force[steps]), 1),
-        "largest force [N]": number(c.peak, 1) + ("*" if c.truth_known else ""),
-        "nearest [m]": number(body.distance if body else None, 3),
-        "fastest [m/s]": number(fastest.max, 3),
-        "REACT": percent(modes[Mode.REACT][1]),
-        "HOLD": percent(modes[Mode.HOLD][1]),
-    }
-
-
-def _median_norm(forces: FloatArray) -> float | None:
-    """Median norm [N] of forces (N, 3), None of none."""
-    return float(np.median(np.linalg.norm(forces, axis=1))) if len(forces) else None
 
 
 def detection_page(
