@@ -9,31 +9,19 @@ from pretouch.sensing.skin import PAPER_SKIN, load_skin
 from tests.importing.made import six_axis, written
 
 
-def test_numbers_figure_and_a_skin_with_more_units(tmp_path, capsys, panda_model):
-    skin, figure, numbers = tmp_path / "more.toml", tmp_path / "arm.png", tmp_path / "coverage.json"
+def test_numbers_and_a_skin_with_more_units(tmp_path, capsys, panda_model):
+    skin, numbers = tmp_path / "more.toml", tmp_path / "coverage.json"
     told = ["skin", "coverage", str(PAPER_SKIN), "--workspace", "circle", "--postures", "4", "--seed", "1000"]
-    told += [
-        "--suggest",
-        "2",
-        "--sensor",
-        "vl53l5cx",
-        "--out",
-        str(skin),
-        "--figure",
-        str(figure),
-        "--json",
-        str(numbers),
-    ]
+    told += ["--suggest", "2", "--sensor", "vl53l5cx", "--out", str(skin), "--json", str(numbers)]
     assert main(told) == 0
     printed = " ".join(capsys.readouterr().out.split())
     for part in ("Seen in time: panda, 4 postures of circle", "whole arm", "be seen 0.37 m", "forearm_left",
                  "Blind spots, with less than 10 % of the paths seen:", "panda_link2, its back, ", " cm^2",
                  "2 more units:",
-                 "suggested_2", f"Skin: {skin}", f"Figure: {figure}"):  # fmt: skip
+                 "suggested_2", f"Skin: {skin}"):  # fmt: skip
         assert part in printed
     assert "suggested_1/" not in printed, "a unit with zones is shown whole"
     assert [unit.id for unit in load_skin(skin, panda_model).mounted[-2:]] == ["suggested_1", "suggested_2"]
-    assert figure.read_bytes().startswith(b"\x89PNG")
     found = json.loads(numbers.read_text())
     assert found["asked"]["approach"]["warning_m"] == pytest.approx(0.373)
     assert found["links"][-1]["name"] == "whole arm"
@@ -65,13 +53,12 @@ def test_an_imported_arm_gets_its_first_units(tmp_path, capsys):
     [
         (["--out", "x.toml"], "give their number with --suggest"),
         (["--suggest", "-1"], "--suggest is -1: give 1 or more"),
-        (["--figure", "arm.gif"], "has an unknown format: use one of the endings .png, .pdf, .svg"),
         (["--seed", "-1"], "The seed is -1: give 0 or more"),
         (["--workspace", "moon"], "The workspace is 'moon': give circle"),
         (["--suggest", "400", "--postures", "2"], "400 more units were requested, but"),
         (["--suggest", "1", "--sensor", "sonar"], "--sensor has the sensor 'sonar': choose from"),
         (["--arm", "no-such-arm"], "no-such-arm"),
-        (["--json", "a.json", "--figure", "a.json/b.png"], "is also another input or output file"),
+        (["--json", "a.json", "--suggest", "1", "--out", "a.json/b.toml"], "is also another input or output file"),
     ],
 )
 def test_what_cannot_be_done_is_said(more, said, tmp_path, capsys, monkeypatch):

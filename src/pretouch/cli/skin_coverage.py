@@ -10,15 +10,14 @@ from rich.console import Console
 
 from pretouch.cli.options import JsonFile, OptionalFile
 from pretouch.cli.tables import show
-from pretouch.cli.writing import check_outputs, numbers_to, unwritable_said
+from pretouch.cli.writing import check_outputs, numbers_to
 from pretouch.coverage import measure
 from pretouch.coverage.blind import BLIND, blind_spots
 from pretouch.coverage.measure import CoverageSetting, covered
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import Suggestion, candidates, suggest
 from pretouch.coverage.ways import Ways, seen_by
-from pretouch.errors import ExperimentError, ParameterError, SkinError
-from pretouch.extras import FIGURES
+from pretouch.errors import ParameterError, SkinError
 from pretouch.perception.scene_filter import floor_and_pedestal
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
@@ -27,7 +26,6 @@ from pretouch.sensing.skin import Skin, load_skin, save_skin, skin_file
 from pretouch.text_table import TextTable, tabulated
 from pretouch.types import BoolArray
 
-_FORMATS = (".png", ".pdf", ".svg")
 _SPOTS = 8
 """Blind spots that are printed; the file of numbers has all."""
 
@@ -55,8 +53,6 @@ class MeasureCoverage:
     """Type of sensor of additional units: vl53l1x, vl53l5cx, vl53l7cx, capacitive, or what the skin file describes."""
     out: OptionalFile = None
     """Skin file to write, with --suggest: the existing units and the new ones."""
-    figure: OptionalFile = None
-    """File for a figure of the arm, ending in .png, .pdf or .svg."""
     json: JsonFile = None
     replace: bool = False
     """Overwrite existing files."""
@@ -87,23 +83,16 @@ class MeasureCoverage:
             )
         if self.seed < 0:
             raise ParameterError(f"The seed is {self.seed}: give 0 or more.")
-        if self.figure and self.figure.suffix not in _FORMATS:
-            raise ExperimentError(
-                f"The figure {self.figure} has an unknown format: use one of the endings {', '.join(_FORMATS)}."
-            )
-        if self.figure:
-            FIGURES.need("A figure")
-        check_outputs([("skin file", self.out), ("figure", self.figure), ("file", self.json)], [source], self.replace)
+        check_outputs([("skin file", self.out), ("file", self.json)], [source], self.replace)
 
 
 def _measured(command: MeasureCoverage, setting: CoverageSetting, skin: Skin) -> dict[str, Any]:
-    """Measure, print and draw; return the numbers."""
+    """Measure and print; return the numbers."""
     sets, console = setting.draw(), Console(highlight=False)
     masks = [seen_by(one, skin) for one in sets]
-    measures, new = [covered(one, sees) for one, sees in zip(sets, masks, strict=True)], frozenset[str]()
-    shares, sees = measures[0], masks[0]
-    spots = blind_spots(sets[0], shares)
-    show(console, [_link_table(setting, measures), *([_unit_table(skin, sets[0], sees)] if len(skin) else [])])
+    measures = [covered(one, sees) for one, sees in zip(sets, masks, strict=True)]
+    spots = blind_spots(sets[0], measures[0])
+    show(console, [_link_table(setting, measures), *([_unit_table(skin, sets[0], masks[0])] if len(skin) else [])])
     total = 1e4 * sum(spot.area_m2 for spot in spots)
     lines = [f"Blind spots, with less than {100 * BLIND:g} % of the paths seen: {len(spots)}, {total:.0f} cm^2 in all."]
     lines += [f"  {spot.sentence}" for spot in spots[:_SPOTS]]
@@ -115,25 +104,17 @@ def _measured(command: MeasureCoverage, setting: CoverageSetting, skin: Skin) ->
         places = candidates(sets[0], skin, sensor_called(command.sensor, "--sensor", own))
         suggested = suggest(sets, skin, command.suggest, places)
         old, skin = skin, Skin((*skin.mounted, *(one.unit for one in suggested)), setting.model)
-        new = frozenset(one.unit.id for one in suggested)
         # what the new units add, by ways that they were not chosen by
         sets, first = setting.draw(1), len(old.first)
         masks = [seen_by(one, skin) for one in sets]
         before = [covered(one, sees[:first]) for one, sees in zip(sets, masks, strict=True)]
         after = [covered(one, sees) for one, sees in zip(sets, masks, strict=True)]
-        shares = after[0]
         show(console, [_suggestion_table(suggested, len(places), before, after)])
         numbers["suggested"] = suggested
         numbers["before"], numbers["after"] = _numbers(before), _numbers(after)
         if command.out:
             save_skin(skin, command.out)
             console.print(f"Skin: {command.out}", markup=False, soft_wrap=True)
-    if command.figure:
-        from pretouch.coverage.figure import coverage_figure  # needs the extra
-
-        with unwritable_said("figure", command.figure):
-            coverage_figure(sets[0], shares, skin, new).savefig(command.figure, dpi=110)
-        console.print(f"Figure: {command.figure}", markup=False, soft_wrap=True)
     return numbers
 
 
