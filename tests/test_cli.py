@@ -10,7 +10,7 @@ import pytest
 
 from pretouch import cli, extras, plugins
 from pretouch.atomic_write import write_json
-from pretouch.cli.app import COMMANDS, GROUP, OWN, SHELLS, commands_of, overview
+from pretouch.cli.app import COMMANDS, GROUP, OWN, commands_of, overview
 from pretouch.cli.writing import check_writable
 from pretouch.profiles import profile
 
@@ -167,21 +167,11 @@ def test_wrong_words_are_answered_with_what_is_right(capsys, monkeypatch, words,
             + ", ".join(n for n in OWN if n.startswith("skin "))
             + ".",
         ),
-        ("completion fish", f"pretouch completion is for one shell: choose from {', '.join(SHELLS)}."),
     ],
 )
 def test_words_that_are_no_command_are_one_sentence(capsys, words, said):
     assert cli.main(words.split()) == 2
     assert capsys.readouterr().err == f"{said}\n"
-
-
-def test_bash_takes_the_completion(capsys):
-    with pytest.raises(SystemExit) as stop:
-        cli.main(["completion", "bash"])
-    assert not stop.value.code
-    script = capsys.readouterr().out
-    assert "--profile" in script
-    subprocess.run(["bash", "-n"], input=script, text=True, check=True)  # noqa: S607
 
 
 def test_the_name_of_the_table_is_a_profile():

@@ -3,15 +3,14 @@
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import make_dataclass
 from difflib import get_close_matches
-from typing import Annotated, Any, NoReturn, Union, cast
+from typing import Any, cast
 
 import tyro
 from rich.console import Console
 
-from pretouch.cli.app import COMMANDS, SHELLS, Command, command_class, command_names, overview, split_name
-from pretouch.errors import ParameterError, PluginError, PretouchError
+from pretouch.cli.app import COMMANDS, Command, command_class, command_names, overview, split_name
+from pretouch.errors import PluginError, PretouchError
 from pretouch.signals import Terminated, ends_raise, exit_code
 
 # a command's module takes up to a second to import: of all commands, only the one that is named is loaded
@@ -51,8 +50,6 @@ def _read(args: Sequence[str], errors: Console) -> Command:
         if hasattr(kind, "of_words"):  # its options depend on what the first words name
             kind, words, name = kind.of_words(words)
         return cast(Command, tyro.cli(kind, prog=f"pretouch {name}", args=words, config=_CONFIG))
-    if name == "completion":
-        _write_completion(words, errors)
     below = [each for each in names if each.startswith(f"{name} ")]
     if name in ("", "-h", "--help") or (below and (not words or words[0] in ("-h", "--help"))):
         listed = below or names
@@ -79,23 +76,3 @@ def _loaded(names: Sequence[str], errors: Console) -> dict[str, Any]:
         except PluginError as error:
             errors.print(str(error), markup=False)
     return kinds
-
-
-def _write_completion(shells: Sequence[str], errors: Console) -> NoReturn:
-    """Print what a shell needs to complete the words of all commands, and end."""
-    if len(shells) != 1 or shells[0] not in SHELLS:
-        raise ParameterError(f"pretouch completion is for one shell: choose from {', '.join(SHELLS)}.")
-    tree: dict[str, dict[str, Any]] = {}
-    for name, kind in _loaded(command_names(), errors).items():
-        first, _, second = name.partition(" ")
-        tree.setdefault(first, {})[second] = kind.of_all() if hasattr(kind, "of_all") else kind
-    kinds = {
-        first: kinds[""] if "" in kinds else make_dataclass(first, [("what", _one_of(kinds))])
-        for first, kinds in tree.items()
-    }
-    tyro.cli(_one_of(kinds), prog="pretouch", args=["--tyro-print-completion", *shells], config=_CONFIG)
-    raise SystemExit(0)
-
-
-def _one_of(kinds: dict[str, Any]) -> Any:
-    return Union[tuple(Annotated[kind, tyro.conf.subcommand(name)] for name, kind in kinds.items())]  # noqa: UP007  # made when it is asked for

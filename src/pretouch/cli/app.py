@@ -2,8 +2,7 @@
 
 A command is a dataclass whose docstrings are the help and whose `run()` does it. `run()` returns the exit code; with
 None it is 0, or that of the signal which ended the command. Where its options depend on what its first word names,
-`of_words(words)` returns the class, the words that are left, and those in front of them; `of_all()`, if it is there,
-the class whose options a shell completes.
+`of_words(words)` returns the class, the words that are left, and those in front of them.
 """
 
 from collections.abc import Iterable, Sequence
@@ -53,8 +52,6 @@ COMMANDS: dict[str, dict[str, tuple[str, str]]] = {
 
 A table, because a look at all installed distributions takes time.
 """
-SHELLS = ("bash", "zsh", "tcsh")
-"""Shells that `pretouch completion` writes for."""
 _PLACES = {name: place for group in COMMANDS.values() for name, (place, _) in group.items()}
 OWN = tuple(name for name, place in _PLACES.items() if ":" in place)
 """Commands of the product."""
@@ -114,7 +111,7 @@ def split_name(words: Sequence[str], names: Iterable[str]) -> tuple[str, Sequenc
 
 def overview(names: Iterable[str], first_lines: dict[str, str]) -> str:
     """Return the help on some commands, a line of 80 columns each; those in no group have a line of their own."""
-    lines = ['usage: pretouch COMMAND [--help ...]   Tab: eval "$(pretouch completion bash)"']
+    lines = ["usage: pretouch COMMAND [--help ...]"]
     groups = {title: {n: line for n, (_, line) in group.items() if n in names} for title, group in COMMANDS.items()}
     for title, group in (groups | {"Added": first_lines}).items():
         for i, (name, line) in enumerate(group.items()):

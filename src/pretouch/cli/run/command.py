@@ -4,12 +4,11 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Generic, Union
+from typing import Any, Generic
 
 import numpy as np
-import tyro
 
-from pretouch.arms import ArmSetup, OpenedArm, arm_class, arm_names
+from pretouch.arms import ArmSetup, OpenedArm, arm_class
 from pretouch.calibration.motion.plan import Plan
 from pretouch.cli.options import A, JsonFile, OptionalFile, RobotOptions, SkinOptions, TaskOptions, split_arm
 from pretouch.cli.run.setup import free_motion, heard_units, run_setup
@@ -57,12 +56,6 @@ class Run(Generic[A]):
         """Return the command for the arm that the first word names, the other words, and what is in front of them."""
         name, others = split_arm(words)
         return Run[arm_class(name)], others, f"run {name}" if len(others) < len(words) else "run"  # type: ignore[misc]
-
-    @staticmethod
-    def of_all() -> Any:
-        """Return the command with all arms as words that follow it."""
-        arms = [Annotated[arm_class(name), tyro.conf.subcommand(name)] for name in arm_names()]
-        return Run[Union[tuple(arms)]]  # type: ignore[misc]  # noqa: UP007  # made when it is asked for
 
     def run(self) -> int | None:
         """Move the arm. Where a signal ended the run in order, its code is the exit code."""
