@@ -17,7 +17,6 @@ import pytest
 from pretouch import cli
 from pretouch.cli import skin_monitor
 from pretouch.cli.skin_monitor import only_here
-from pretouch.sensing.skin import PAPER_SKIN
 from pretouch.types import RangeStatus
 from pretouch.units import EVERYWHERE
 from pretouch.units.keys import Keys, UnitKey, load_keys, new_key, save_keys
@@ -113,21 +112,6 @@ def test_units_with_other_keys_are_told_from_silent_ones(keys, port, tmp_path, c
     assert "with a wrong tag (another key, or a forgery)" in capsys.readouterr().out
 
 
-@pytest.mark.slow
-def test_a_posture_tells_whether_units_agree_with_the_model(panda_model, paper_skin, port, tmp_path, capsys):
-    made = Keys(UnitKey(name, number, new_key()) for number, name in enumerate(paper_skin.ids, 1))
-    save_keys(made, tmp_path / "keys.toml")
-    posture = ",".join(map(str, panda_model.description.q_ready))
-    with Desk(made, port) as desk:  # all see a wall; of the arm, the one at the back must see more
-        desk.distance = 0.9
-        code = monitor(tmp_path, port, "--duration", "7", "--skin", str(PAPER_SKIN), "--posture", posture)
-    assert code == 1
-    said = capsys.readouterr().out
-    assert "fault: hand_back reports 0.90 m where the model has the arm" in said
-    # when it came, and at the end
-    assert said.split("Nothing was received")[0].count("where the model has the arm") == 2
-
-
 def test_a_terminal_shows_a_table_that_changes(keys, port, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("TERM", "xterm")
@@ -166,9 +150,7 @@ def test_a_disk_that_is_full_is_said_and_the_exit_code_tells_of_it(keys, port, t
         (("--duration", "nan"), "--duration is nan s"),
         (("--units", "elbow"), "There is no key for elbow"),
         (("--units", "wrist", "--skin", "x.toml"), "Both --skin and --units are given"),
-        (("--posture", "0,0"), "--posture needs --skin"),
         (("--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
-        (("--skin", str(PAPER_SKIN), "--posture", "99,0,0,-2,0,2,0"), "joint 1 at 99 rad, outside its range of -2.90"),
         (("--host", ""), "The address to listen on is empty"),
         (("--host", "no.such.host.invalid"), "no.such.host.invalid"),
         (("--port", "70000"), "70000"),

@@ -10,29 +10,27 @@ from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.text import Text
 
-from pretouch.cli.options import JsonFile, Numbers, OptionalFile, Words
+from pretouch.cli.options import JsonFile, OptionalFile, Words
 from pretouch.cli.tables import PlainTable
 from pretouch.cli.writing import numbers_to
 from pretouch.errors import HardwareError
-from pretouch.perception.scene_filter import no_fixtures
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin
 from pretouch.sensing.unit import NetworkUnits
 from pretouch.signals import Terminated
-from pretouch.types import FloatArray, RangeStatus
+from pretouch.types import RangeStatus
 from pretouch.units import EVERYWHERE, HOST, PORT
 from pretouch.units.findings import Finding
 from pretouch.units.health import UnitHealth, status_name
 from pretouch.units.keys import load_keys
 from pretouch.units.skin import NetworkSkin
 from pretouch.units.skin_recording import SkinRecording
-from pretouch.units.watch import ModelCheck, UnitWatch, WatchUpdate
+from pretouch.units.watch import UnitWatch, WatchUpdate
 
 _SECOND_S = 1.0
 _UPDATE_S = 0.25
@@ -66,9 +64,6 @@ class Monitor:
     """Names of the units to watch, separated by commas."""
     arm: str = "panda"
     """The arm of the skin file: panda, fr3, or the folder of an imported arm."""
-    posture: Numbers = ()
-    """Joint positions [rad], separated by commas, of the arm that stands still: with --skin, units whose readings
-    contradict the model are named. Nothing but the arm may be near."""
     host: str = HOST
     """Address to listen at. Real units need 0.0.0.0, which is every address of this machine."""
     port: int = PORT
@@ -94,12 +89,12 @@ def _monitored(command: Monitor, duration: float, write: Callable[[Any], None]) 
             f"The address to listen on is empty: give {HOST}, or {EVERYWHERE} for every address of this machine."
         )
     keys = load_keys(command.keys)
-    units, check, q = _watched(command, tuple(keys))
+    units = _watched(command, tuple(keys))
     last: WatchUpdate | None = None
     with ExitStack() as stack:
         receiver = stack.enter_context(NetworkSkin(units, keys, command.host, command.port))
         recording = stack.enter_context(SkinRecording(command.record)) if command.record else None
-        updates = UnitWatch(receiver, _UPDATE_S, check, lambda: q).updates(duration)
+        updates = UnitWatch(receiver, _UPDATE_S).updates(duration)
         try:
             for update in _shown(updates, receiver, recording):
                 last = update
@@ -112,33 +107,15 @@ def _monitored(command: Monitor, duration: float, write: Callable[[Any], None]) 
     return int(faulty or bool(recording and recording.trouble))
 
 
-def _watched(command: Monitor, all_ids: tuple[str, ...]) -> tuple[NetworkUnits, ModelCheck | None, FloatArray]:
-    """The units to watch, and what they are to agree with, if a posture (n,) [rad] is given."""
+def _watched(command: Monitor, all_ids: tuple[str, ...]) -> NetworkUnits:
     if command.skin and command.units:
         raise HardwareError("Both --skin and --units are given: leave one of them out.")
-    if command.posture and not command.skin:
-        raise HardwareError("--posture needs --skin, the file with the poses of the units.")
-    q = np.array(command.posture)
-    if not command.skin:
-        ids = command.units or all_ids
-        if not ids:
-            raise HardwareError(f"{command.keys} holds no unit: `pretouch skin provision` or `skin keys` adds one.")
-        return NetworkUnits.of(ids), None, q
-    model = RobotModel(robot_named(command.arm))
-    skin = load_skin(command.skin, model)
-    if not command.posture:
-        return skin.network, None, q
-    if q.shape != (model.n,) or not np.isfinite(q).all():
-        raise HardwareError(
-            f"The posture is {','.join(map('{:g}'.format, q))}: give {model.n} joint positions [rad], separated by"
-            " commas."
-        )
-    for i in np.flatnonzero((q < model.q_min) | (q > model.q_max)).tolist():
-        raise HardwareError(
-            f"The posture has joint {i + 1} at {q[i]:g} rad, outside its range of {model.q_min[i]:.2f} to"
-            f" {model.q_max[i]:.2f} rad: give joint positions of this arm."
-        )
-    return skin.network, ModelCheck(model, skin, no_fixtures()), q
+    if command.skin:
+        return load_skin(command.skin, RobotModel(robot_named(command.arm))).network
+    ids = command.units or all_ids
+    if not ids:
+        raise HardwareError(f"{command.keys} holds no unit: `pretouch skin provision` or `skin keys` adds one.")
+    return NetworkUnits.of(ids)
 
 
 def _shown(

@@ -202,9 +202,7 @@ class UnitWatch:
         now = begun = due = time.monotonic()
         while now < begun + duration:
             due = min(max(due, now - self._every) + self._every, begun + duration)
-            while (left := due - time.monotonic()) > 0:
-                time.sleep(min(left, _COMPARE_S))
-                self._compare()
+            time.sleep(max(due - time.monotonic(), 0.0))
             samples = self._look()
             now = time.monotonic()
             yield WatchUpdate(now, now - begun, samples, *self.judge(), now >= begun + duration)
