@@ -48,8 +48,8 @@ class LivePage:
         self._scene = Scene(server, simulation.world, on_drag=self._drag)
         self.status.notice = f"{self._scene.notice} {simulation.notice}".strip()
         simulation.notice = ""
-        self._history = History(simulation.skin.first)
-        self._plots = Plots(server.gui, self._history, [unit.id for unit in simulation.skin.mounted])
+        self._history = History()
+        self._plots = Plots(server.gui, self._history)
         self.controls.fold_rest(self._scene.show)
 
     def _drag(self, eye: FloatArray, place: FloatArray) -> None:
@@ -78,9 +78,8 @@ class LivePage:
         recording, before = simulation.recording, simulation.time
         self.drive.turn()
         steps = [] if running.paused else simulation.advance(running.speed * PERIOD_S)
-        late = simulation.frame.late(simulation.world.profile.sight.slow_after_s)
         for step in steps:
-            self._history.add(step, late=late)
+            self._history.add(step)
             self._scene.trail.add(step)
         if self._companions:
             self._companions.follow(len(steps))

@@ -32,17 +32,11 @@ PLACE: Colour = (190, 24, 120)
 HAND: Colour = (232, 178, 146)
 CUFF: Colour = (58, 92, 148)
 BOARD: Colour = (201, 176, 140)
-BROWN: Colour = (140, 100, 75)
-PINK: Colour = (214, 110, 176)
-TEAL: Colour = (90, 160, 170)
-OLIVE: Colour = (170, 150, 40)
 
 EXPECTED: tuple[Colour, ...] = (ARM, (250, 208, 138), (242, 130, 58), (204, 28, 36))
 """The arm where contact is not expected, less, more, and most."""
 REMEMBERED: tuple[Colour, ...] = (SENSED, (203, 228, 213))
 """A place that is seen now, and one that nothing has seen for long."""
-UNITS = (PATH, FORCE, SENSED, LIMITING, REACTING, BROWN, PINK, TEAL, OLIVE, FOLLOWING)
-"""A colour for each unit, over again from the eleventh on."""
 
 _LINES = {
     "path": PATH,

@@ -164,8 +164,8 @@ class ReplayPage:
         self._status.notice = recorded.sentence
         self._add_controls(server.gui)
         self._scene = Scene(server, world)
-        self.history = History(world.skin.first, stamps[0])
-        self._plots = Plots(server.gui, self.history, [unit.id for unit in world.skin.mounted])
+        self.history = History(stamps[0])
+        self._plots = Plots(server.gui, self.history)
         with server.gui.add_folder("View", expand_by_default=False):
             add_view_boxes(server.gui, self._actions, self._scene.show)
 
@@ -230,8 +230,7 @@ class ReplayPage:
         stride = max(1, (index + 1 - start) // _MOST) if follows else _STRIDE
         for i in range(index, start - 1, -stride)[::-1]:
             cycle = recorded[i]
-            slow = self._world(cycle.run).profile.sight.slow_after_s
-            self.history.add(cycle.step, frame_of(cycle).late(slow))
+            self.history.add(cycle.step)
             self._scene.trail.add(cycle.step)
         self._drawn = index
         cycle = recorded[index]
