@@ -67,7 +67,7 @@ def test_everything_that_was_asked_for_is_on_the_page(reader):
         "For orientation, not conformity", "Parameters", "detect.f_base_n", "panda_hand", "1 of 100 samples",
     ):  # fmt: skip
         assert words in reader.said, words
-    assert reader.tags.count("figure") == 3
+    assert reader.tags.count("figure") == 2
 
 
 def one_step(model, skin, **changes):

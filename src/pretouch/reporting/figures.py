@@ -17,7 +17,7 @@ from pretouch.reporting.contacts import AXES
 from pretouch.reporting.html import Html, element, html
 from pretouch.reporting.measures import d_crit, d_notice
 from pretouch.reporting.record import RunCourse
-from pretouch.types import FloatArray, Mode
+from pretouch.types import Mode
 
 INK, BLUE, RED, GREEN, AMBER, GREY = "#1f2933", "#2b6cb0", "#c53030", "#2f855a", "#b7791f", "#a0aab4"
 _SHADES = {Mode.REACT: (RED, 0.16), Mode.HOLD: (GREY, 0.28)}
@@ -26,8 +26,6 @@ _LINES = tuple(zip(_LINE_COLOURS, ("-", "--", "-.", ":", "-", "--", "-.", "-"), 
 """Colour and style of each of several lines; more lines than these begin again."""
 _SWITCHES = 12
 """More changes of the profile than this are not drawn."""
-_BEFORE_S, _AFTER_S = 0.3, 0.7
-"""Time shown about a contact [s]."""
 _MARKS = 3
 """Order of what is drawn over the lines, and never as pixels."""
 _MOST_DRAWN = 3000
@@ -99,7 +97,7 @@ def force_figure(course: RunCourse) -> Figure:
     """
     figure, (*along, evidence) = _panels(course, (1, 1, 1, 0.7), 9.2)
     for k, axes in enumerate(along):
-        _along(axes, course, k, (-np.inf, np.inf))
+        _along(axes, course, k)
     _legend(along[0], 7)
     evidence.plot(course.time, course.evidence, color=BLUE, lw=1.0)
     evidence.axhline(1.0, color=INK, lw=1.0)
@@ -107,36 +105,18 @@ def force_figure(course: RunCourse) -> Figure:
     return figure
 
 
-def close_up_figure(course: RunCourse, time: float, force: FloatArray) -> Figure:
-    """The same about one contact [s], along the axis to which its force (3,) points most."""
-    figure, (axes,) = _panels(course, (1,), 3.2)
-    span = time - _BEFORE_S, time + _AFTER_S
-    _along(axes, course, int(np.abs(np.nan_to_num(force)).argmax()), span)
-    axes.set_xlim(span)
-    _legend(axes, 7)
-    return figure
-
-
-def _along(axes: Axes, course: RunCourse, k: int, span: tuple[float, float]) -> None:
-    """Draw the force along an axis of the base frame in a span of time [s]."""
-
-    def within(time: FloatArray) -> slice:
-        return slice(*np.searchsorted(time, span).tolist())
-
-    steps = within(course.time)
-    time, force, filtered = course.time[steps], course.force[steps, k], course.filtered_force[steps, k]
+def _along(axes: Axes, course: RunCourse, k: int) -> None:
+    """Draw the force along an axis of the base frame."""
+    time, force, filtered = course.time, course.force[:, k], course.filtered_force[:, k]
     if course.truth is not None:
-        instants = within(course.truth.time)
-        true = course.truth.force[instants, k]
-        axes.plot(course.truth.time[instants], true, color=GREEN, lw=0.9, ls="--", label="true force")
+        axes.plot(course.truth.time, course.truth.force[:, k], color=GREEN, lw=0.9, ls="--", label="true force")
     axes.plot(time, force, color=GREY, lw=0.9, label="estimate")
     if course.by_thresholds:
         axes.plot(time, filtered, color=BLUE, lw=1.3, label="value of eq. 8")
     bounds = "thresholds" if course.by_thresholds else "bands of one sample"
-    axes.plot(time, course.upper[steps, k], color=INK, lw=1.0, label=bounds)
-    axes.plot(time, course.lower[steps, k], color=INK, lw=1.0)
-    detected = [i for i, contact, _ in course.contacts if contact.axes[k] or not course.by_thresholds]
-    at = [i - steps.start for i in detected if steps.start <= i < steps.stop]
+    axes.plot(time, course.upper[:, k], color=INK, lw=1.0, label=bounds)
+    axes.plot(time, course.lower[:, k], color=INK, lw=1.0)
+    at = [i for i, contact, _ in course.contacts if contact.axes[k] or not course.by_thresholds]
     value = filtered if course.by_thresholds else force
     mark: Any = {"color": RED, "mec": "white", "mew": 0.6, "ms": 7, "zorder": _MARKS, "label": "detected"}
     axes.plot(time[at], value[at], "v", **mark)

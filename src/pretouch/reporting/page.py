@@ -9,7 +9,7 @@ from pretouch.contact.scatter import HELD_S
 from pretouch.explanation import LOUD_N
 from pretouch.reporting import measures
 from pretouch.reporting.contacts import ContactMeasures, contact_section
-from pretouch.reporting.figures import close_up_figure, force_figure, motion_figure, picture, style
+from pretouch.reporting.figures import force_figure, motion_figure, picture, style
 from pretouch.reporting.health import health_section
 from pretouch.reporting.html import Html, Text, bad, document, element, joined, percent, table_html
 from pretouch.reporting.measures import Measures
@@ -45,7 +45,6 @@ def _recording(m: Measures) -> list[Text]:
         element("h3", "Contacts"),
         contact_section(course, m.contacts),
         picture(force_figure(course), f"{forces} {_SHADED}"),
-        *_strongest(m),
         element("h3", "Distances"),
         measures.distance_section(course),
         element("h3", "Speed"),
@@ -62,17 +61,6 @@ def _recording(m: Measures) -> list[Text]:
         element("h3", "Parameters"),
         parameter_section(course),
     ]
-
-
-def _strongest(m: Measures) -> list[Html]:
-    """Show the contact with the largest estimate close up."""
-    sizes = np.array([d.peak_norm for d in m.contacts.detections])
-    if not np.isfinite(sizes).any():
-        return []
-    order = int(np.nanargmax(sizes))
-    strongest = m.contacts.detections[order]
-    figure = close_up_figure(m.course, strongest.time, strongest.contact.force)
-    return [picture(figure, f"Contact {order + 1}, the one with the largest force estimate, close up.")]
 
 
 def summary(m: Measures) -> Html:

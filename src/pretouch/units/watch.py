@@ -108,15 +108,11 @@ class ModelCheck:
 class WatchUpdate:
     """Samples since the previous update, and the health of the units."""
 
-    time: float
-    """Instant, by the receiver's clock [s]."""
     elapsed: float
     """Time since watching began [s]."""
     samples: list[Received]
     units: tuple[UnitHealth, ...]
     findings: tuple[Finding, ...]
-    last: bool
-    """True if the duration is over."""
 
 
 class UnitWatch:
@@ -198,14 +194,14 @@ class UnitWatch:
                 )
 
     def updates(self, duration: float = math.inf) -> Iterator[WatchUpdate]:
-        """Yield an update at each look for a duration [s], by the monotonic clock; the last one is marked."""
+        """Yield an update at each look for a duration [s], by the monotonic clock."""
         now = begun = due = time.monotonic()
         while now < begun + duration:
             due = min(max(due, now - self._every) + self._every, begun + duration)
             time.sleep(max(due - time.monotonic(), 0.0))
             samples = self._look()
             now = time.monotonic()
-            yield WatchUpdate(now, now - begun, samples, *self.judge(), now >= begun + duration)
+            yield WatchUpdate(now - begun, samples, *self.judge())
 
     def _traffic(self) -> list[UnitTraffic]:
         """Return what was counted, older than the samples by up to 0.3 s but for the newest arrivals."""
