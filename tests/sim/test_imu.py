@@ -184,15 +184,6 @@ def test_without_units_and_with_rates_there_are_not(panda_model):
         ImuParams(rate_hz=5.0)
 
 
-def test_a_seed_decides_the_samples(panda_model, paper_skin):
-    first, again, other = (Rig(panda_model, paper_skin, ImuParams(), seed) for seed in (3, 3, 4))
-    for rig in (first, again, other):
-        rig.plant.advance(0.2)
-    told = [[(s.unit, s.time, *s.counts) for s in rig.samples] for rig in (first, again, other)]
-    assert told[0] == told[1]
-    assert told[0] != told[2]
-
-
 def test_sensors_change_nothing_of_the_arms_motion(panda_model, paper_skin):
     rig = Rig(panda_model, paper_skin, ImuParams())
     bare = Plant(panda_model, SceneSpec(), NO_ERROR, panda_model.description.q_ready, 0)

@@ -206,17 +206,6 @@ def test_torques_stay_within_the_limits_whatever_is_commanded(panda_model):
     assert np.all(largest[4:] == limit[4:]), "the command was too gentle to reach the limits"
 
 
-def test_an_arm_is_decided_by_its_seed(panda_model):
-    runs = []
-    for plant in (arm(panda_model, seed=seed, at=LEFT) for seed in (3, 3, 4)):
-        plant.command(np.linspace(-0.2, 0.2, 7))
-        runs.append(record(plant, 0.2))
-    for name in ("q", "qd", "q_commanded", "tau_ext", "wrench"):
-        one, same, else_ = (np.array([getattr(state, name) for state in states]) for states in runs)
-        assert np.array_equal(one, same)
-        assert not np.array_equal(one, else_)
-
-
 def test_time_split_differently_is_the_same_time(panda_model):
     whole, pieces = arm(panda_model), arm(panda_model)
     whole.advance(0.1)
