@@ -1,6 +1,5 @@
 """The receiver at a real socket, under a clock set by hand: what it takes in, what it makes of it, what it refuses."""
 
-import math
 import socket
 from types import SimpleNamespace
 
@@ -218,16 +217,6 @@ def test_waiting_ends_with_the_first_datagram_or_in_time(bench):
     bench.socket.sendto(bench.units[0].hello(bench.now), bench.receiver.address)
     assert bench.receiver.receive(30.0) == 0
     assert len(bench.deliver()) == 1
-
-
-def test_counters_are_plain_numbers(bench):
-    bench.join()
-    unit = bench.receiver.units[0]
-    for name in ("accepted", "lost", "replayed", "hellos", "sessions", "reboots", "clock_jumps"):
-        assert type(getattr(unit, name)) is int, name
-    for name in ("last_arrival", "last_reading_stamp", "offset", "bound"):
-        assert type(getattr(unit, name)) is float, name
-        assert math.isfinite(getattr(unit, name))
 
 
 def test_the_port_of_units_is_none_that_any_socket_may_be_given():

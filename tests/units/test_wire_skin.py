@@ -1,5 +1,4 @@
 from collections.abc import Callable
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -56,34 +55,6 @@ def test_the_wire_is_deterministic_bit_for_bit(plant, paper_skin):
         runs.append((*(told[key].tobytes() for key in ("stamp", "distance", "status")), counted, imu))
     assert runs[0] == runs[1]
     assert runs[0][0] != runs[2][0], "another seed takes another course"
-
-
-@pytest.mark.parametrize("loss", [0.0, pytest.param(0.1, marks=pytest.mark.slow), 0.3])
-def test_the_receiver_counts_what_the_network_lost(plant, paper_skin, loss):
-    arm = plant()
-    with WireSkin(arm, paper_skin, RangeFinderParams(), FleetParams(network(loss)), 0) as skin:
-        watched(arm, skin, 6.0)
-        steady = [u for u in skin.receiver.units if u.sessions == 1]
-        sequences = {one.unit: one.sample.sequence for one in skin.receiver.take_samples()}
-        sent = sum(sequences[k] for k, u in enumerate(skin.receiver.units) if u.sessions == 1)
-        share = 1 - sum(u.accepted for u in steady) / sent
-    assert share == pytest.approx(loss, abs=0.03)
-    assert len(steady) >= (5 if loss else 7)
-
-
-def test_imu_samples_come_through_the_wire_in_their_own_time(plant, paper_skin):
-    arm = plant()
-    with WireSkin(arm, paper_skin, RangeFinderParams(), FleetParams(imu=ImuParams()), 0) as skin:
-        watched(arm, skin, 2.0)
-        batches = [batch for batch in imu_taken(skin.receiver) if batch.unit == 0]
-    assert all(late.index == early.index + len(early.stamp) for early, late in pairwise(batches)), (
-        "samples are missing between batches"
-    )
-    size = np.linalg.norm(np.vstack([batch.acceleration for batch in batches]), axis=1)
-    assert size.mean() == pytest.approx(9.8, abs=1.0)
-    assert len(size) == pytest.approx(1.86 * 416, rel=0.06)  # from the first session on
-    stamps = np.concatenate([batch.stamp for batch in batches])
-    assert np.diff(stamps).mean() == pytest.approx(1 / 416, rel=0.04)
 
 
 def test_a_unit_whose_finder_stops_ages_though_it_goes_on_sending_and_a_silent_one_keeps_its_status(plant, paper_skin):
