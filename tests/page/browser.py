@@ -142,26 +142,9 @@ class Visitor:
         field.press("Enter")
         field.blur()
 
-    def enter(self, label: str, text: str) -> None:
-        """Type over what a field holds, key by key as a person does, and press Enter.
-
-        A page sends a change 50 ms after the one before, and in its place whatever comes next, Enter too. So Enter
-        waits for that long by the page's own clock.
-        """
-        self.field(label).select_text()
-        self.field(label).press_sequentially(text, delay=20)
-        self.page.evaluate("new Promise(done => setTimeout(() => setTimeout(done, 60), 60))")
-        self.field(label).press("Enter")
-
-    def value(self, label: str) -> str:
-        return str(self.field(label).input_value())
-
     def choose(self, label: str, option: str) -> None:
         self.page.get_by_label(label, exact=True).first.click()
         self.page.get_by_role("option", name=option, exact=True).click()
-
-    def tick(self, label: str) -> None:
-        self.page.get_by_label(label, exact=True).click()
 
     def drag(self, start: FloatArray, end: FloatArray, finger: bool = False) -> None:
         """Drag with the mouse, or a finger, from where a point (3,) [m] is seen to where another one is."""

@@ -142,14 +142,6 @@ def test_a_unit_colours_the_surface_under_it_fully_nothing_from_the_spread_on_no
     np.testing.assert_allclose(share[:, 0], [1.0, 0.5, 0.0], atol=1e-12)
 
 
-@given(st.floats(0.0, 0.2), st.floats(1e-4, 2e-3))
-def test_patches_are_smooth(at, apart):
-    vertices = np.array([[at, 0.0, 0.0], [at + apart, 0.0, 0.0]])
-    a, b = shares(vertices, np.repeat(UP, 2, axis=0), np.zeros((1, 3)), UP)[:, 0]
-    steepest = 16 / (3 * np.sqrt(3)) / 2 / SPREAD_M  # of (1 - x^2)^2, at x = 1 / sqrt 3
-    assert abs(a - b) <= steepest * apart + 1e-12
-
-
 @given(st.lists(st.floats(0, 1), min_size=3, max_size=3), st.lists(st.floats(0, 1), min_size=3, max_size=3))
 def test_what_units_expect_adds_up_within_one(share, expected):
     (total,) = on_surface(np.array([share]), np.array(expected))

@@ -119,6 +119,11 @@ def test_what_a_page_says_is_done(page, visitor):
     visitor.type_text(control(page, "Profile text"), " paper:detect.f_base_n=8 ")
     turns(page, 1)
     assert page._simulation.settings.profile.name == "paper:detect.f_base_n=8"
+    visitor.type_text(control(page, "Profile text"), "paper:approach.d_crit_m=0.9")
+    turns(page, 1)
+    assert page.status.notice.startswith("Not done: ApproachRestriction.d_notice_m is 0.6: it must be greater")
+    assert page._simulation.settings.profile.name == "paper:detect.f_base_n=8"
+    assert control(page, "Profile text").value == "paper:approach.d_crit_m=0.9"  # stays to be put right
 
 
 def test_sixty_clicks_on_record_begin_one_recording(page, visitor, tmp_path, monkeypatch):

@@ -90,32 +90,6 @@ def off_line(point: FloatArray, eye: FloatArray, through: FloatArray) -> float:
     return float(np.linalg.norm(np.cross(point - eye, along)))
 
 
-def test_the_page_changes_profile_refuses_what_is_not_allowed_and_drops_a_unit(tmp_path):
-    simulation = LiveSimulation()
-    with live(simulation) as served, chromium() as visitor:
-        visitor.open(served)
-        visitor.choose("Profile", "blind")
-        visitor.tab("Controller")
-        visitor.wait_until(lambda: simulation.world.profile.name == "blind")
-        visitor.wait_until(lambda: visitor.value("Profile text") == "blind")
-
-        visitor.enter("Profile text", "paper:approach.d_crit_m=0.9")
-        visitor.wait_for("notice", "Not done: ApproachRestriction.d_notice_m is 0.6: it must be greater")
-        assert simulation.world.profile.name == visitor.value("Profile") == "blind"
-        assert visitor.value("Profile text") == "paper:approach.d_crit_m=0.9"  # stays to be put right
-        visitor.choose("Profile", "paper")
-        visitor.wait_until(lambda: visitor.value("Profile text") == "paper")
-        visitor.enter("Profile text", " paper:detect.f_base_n=8 ")
-        visitor.wait_until(lambda: simulation.world.profile.name == "paper:detect.f_base_n=8")
-        visitor.wait_until(lambda: visitor.value("Profile") == "paper")
-        visitor.tab("World")
-        visitor.tick("hand_left")
-        visitor.wait_for("reason", "No usable reading from hand_left")
-        visitor.keep("dropped", tmp_path)
-        visitor.tick("hand_left")
-        visitor.wait_for("mode", Mode.TRACK.name)
-
-
 @pytest.mark.parametrize(("width", "height"), [(390, 844), (1024, 768), (1440, 900)])
 def test_the_page_shows_word_and_sentence_of_the_step_and_the_panel_covers_no_scene(tmp_path, width, height):
     simulation = LiveSimulation(LiveSettings(profile=profile("paper"), hand_start=(0.5, 0.45, 0.25)))

@@ -44,16 +44,6 @@ def test_a_profile_is_switched_while_it_runs(running):
     assert np.all(np.abs(after[0].command - before) <= running.model.description.qdd_max * 0.01 + 1e-12)
 
 
-def test_another_speed_is_reached_gently(running):
-    running.advance(1.0)
-    assert np.linalg.norm(running.frame.step.ee_velocity) == pytest.approx(0.3, abs=0.03)
-    set_speed(running, 0.1)
-    after = running.advance(1.5)
-    assert np.linalg.norm(after[-1].ee_velocity) == pytest.approx(0.1, abs=0.02)
-    assert modes(after) == [Mode.TRACK]
-    assert running.world.profile.task.speed_m_s == 0.1
-
-
 def test_what_cannot_be_is_refused_and_nothing_changes(running):
     settings, world = running.settings, running.world
     with pytest.raises(
