@@ -219,45 +219,6 @@ def test_beyond_a_limit_the_box_leads_back_by_numbers(q: float, qd: float, bound
     np.testing.assert_allclose([lower[0], upper[0]], bounds)
 
 
-def fastest_time(limits: JointLimits, q_start: np.ndarray, q_end: np.ndarray, cells: int = 20_000) -> np.ndarray:
-    """Shortest time (n,) from rest at q_start upwards past q_end in continuous time, by dynamic programming over q.
-
-    Backwards from where the envelope ends, a speed may be what the next cell's is plus what braking takes off in
-    between, and no more than the envelope; forwards what the acceleration has added.
-    """
-    stop = np.minimum(limits.q_max, limits.envelope.q_upper - limits.envelope.offset**2 / limits.envelope.slope)
-    at = np.linspace(q_start, stop, cells + 1)
-    gained = 2 * limits.qdd_max * (at[1] - at[0])
-    square = np.array([allowed(q, limits)[0] ** 2 for q in at])
-    square[-1] = np.minimum(square[-1], 0.0)
-    for k in range(cells - 1, -1, -1):
-        square[k] = np.minimum(square[k], square[k + 1] + gained)
-    square[0] = 0.0
-    for k in range(cells):
-        square[k + 1] = np.minimum(square[k + 1], square[k] + gained)
-    speed = np.sqrt(square)
-    counted = at[1:] <= q_end + 1e-12
-    return (np.where(counted, 2 * (at[1] - at[0]) / (speed[1:] + speed[:-1] + 1e-12), 0.0)).sum(axis=0)
-
-
-@pytest.mark.parametrize(("period", "share"), [(0.01, 0.95), (0.001, 0.99)])
-def test_the_course_towards_the_end_is_nearly_as_fast_as_can_be(period: float, share: float):
-    limits = joint_limits(FR3, 0.0, period)
-    end = np.minimum(limits.q_max, limits.envelope.q_upper - limits.envelope.offset**2 / limits.envelope.slope)
-    q, qd = limits.q_min + 0.5, np.zeros(7)
-    best = fastest_time(limits, q, end - 1e-3)
-    needed, steps = np.zeros(7), 0
-    while steps * period < 4.0:
-        upper = joint_box(q, qd, limits.table)[1]
-        before, q, qd = q, q + upper * period, upper
-        passes = (before < end - 1e-3) & (q >= end - 1e-3)
-        needed[passes] = (steps + (end - 1e-3 - before)[passes] / (q - before)[passes]) * period
-        steps += 1
-    assert np.all(needed > 0.999 * best)  # neither is wrong
-    assert np.all(best >= share * needed)
-    np.testing.assert_allclose(q, end, atol=1e-6)  # in the end it gets there
-
-
 singular = st.sampled_from([0.0, 1.0, -1.0, 1 + 1e-12, 1 - 1e-12, -1 - 1e-12, 1.5, -1.5, 1e6]) | st.floats(-3, 3)
 
 

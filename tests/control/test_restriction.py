@@ -101,14 +101,3 @@ def test_rows_are_the_derivative_of_the_distance_to_a_fixed_point(panda_model: R
         ) / (2 * step)
         # approaching makes the distance smaller: d^T J_c qd = -d/dt distance
         np.testing.assert_allclose(rows.G[:, j], -change[rows.which], atol=1e-6)
-
-
-@pytest.mark.parametrize("mode", ["hard", "slack", "floor"])
-def test_rows_belong_to_the_obstacles_within_d_notice(panda_model: RobotModel, mode: str):
-    q, obstacles = random_scene(panda_model, 1, reach=1.2)
-    part = replace(TABLE_I, rows=mode)
-    rows = approach_rows(panda_model.kinematics(q), panda_model.moved_by, obstacles, row_numbers(part))
-    assert rows.weight == (0.0 if mode == "hard" else TABLE_I.slack_weight)
-    np.testing.assert_array_equal(rows.which, np.flatnonzero(obstacles.body_distance < 0.6))
-    assert 0 < len(rows.which) < 12
-    np.testing.assert_allclose(rows.h, limits(obstacles.body_distance[rows.which], part))

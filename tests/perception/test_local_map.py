@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
 from tests.following_arm import Arm
-from tests.fuzz.invariants import same
 from tests.perception.watcher import HAND_LEFT, TCP, Watcher, readings_of
 
 from pretouch.params import LocalMapParams, OutsidePoints, PerceptionParams
@@ -309,18 +308,6 @@ def test_whatever_is_read_obstacles_are_whole_and_as_fast_as_a_hand_at_most(pand
 
 
 # in the controller
-
-
-def test_a_step_leaves_its_state_and_is_the_same_twice(panda_model, paper_skin):
-    arm = Arm(panda_model, paper_skin, PROFILES["pretouch"])
-    for i in range(130):
-        seen = {0: 0.4 - 0.002 * i, 2: 0.3}
-        before, kept = arm.state, [block.copy() for block in arm.state.memory.blocks]
-        cycle = arm.turn(seen=seen)
-        assert same(before.memory.blocks, tuple(kept))
-    again = arm.controller.step(cycle.before, cycle.inputs)
-    assert same(again, (cycle.step, cycle.after))
-    assert arm.state.memory.get("places.number") > 0
 
 
 def test_time_that_goes_backwards_empties_the_map(panda_model, paper_skin):
