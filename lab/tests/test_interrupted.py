@@ -1,6 +1,5 @@
 """A reproduction that a signal ends."""
 
-import json
 import os
 import signal
 import subprocess
@@ -11,7 +10,7 @@ from multiprocessing.connection import wait
 
 import pytest
 
-from pretouch_lab.run import ROWS, RUN
+from pretouch_lab.run import RUN
 
 
 @contextmanager
@@ -43,15 +42,3 @@ def test_ctrl_c_while_workers_start_leaves_no_traceback(tmp_path, delay):
         text = process.communicate(timeout=100)[1]
     assert process.returncode == 130
     assert "Traceback" not in text
-
-
-@pytest.mark.slow
-def test_a_run_that_is_ended_keeps_whole_rows_and_says_how_it_goes_on(tmp_path):
-    with started(tmp_path) as process:
-        wait_for(process, lambda: (tmp_path / ROWS).exists() and (tmp_path / ROWS).read_bytes().count(b"\n") >= 3)
-        os.kill(process.pid, signal.SIGTERM)
-        text = process.communicate(timeout=100)[1]
-    assert process.returncode == 143
-    assert f"rows are in {tmp_path}/{ROWS}; the same command" in text
-    assert "Traceback" not in text
-    assert len([json.loads(line) for line in (tmp_path / ROWS).read_text().splitlines()]) >= 3

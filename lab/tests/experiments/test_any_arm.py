@@ -23,25 +23,6 @@ from pretouch_lab.experiments import avoidance, dynamic
 
 STRONG = '<limit lower="-2.8" upper="2.8" velocity="2" effort="120"/>'
 """Limits of joints that hold such an arm outstretched."""
-
-
-def seven_axis():
-    """An arm of seven joints: the six of `six_axis`, and one along the upper arm."""
-    axes = ("0 0 1", "0 1 0", "0 0 1", "0 1 0", "0 0 1", "0 1 0", "0 0 1")
-    lengths = (0.3, 0.05, 0.35, 0.05, 0.3, 0.1, 0.1)
-    can = '<geometry><cylinder radius="0.05" length="0.08"/></geometry>'
-    parts = [made.link("base", made.BOX)]
-    for k, (axis, length) in enumerate(zip(axes, lengths, strict=True), 1):
-        parts.append(made.link(f"link{k}", can))
-        before = f"link{k - 1}" if k > 1 else "base"
-        parts.append(made.joint(f"joint{k}", before, f"link{k}", axis=axis, xyz=f"0 0 {length}", limit=STRONG))
-    return f'<robot name="sevener">{"".join(parts)}</robot>'
-
-
-ARMS = {
-    "six": made.six_axis(changed={k: {"limit": STRONG} for k in range(1, 7)}),
-    "seven": seven_axis(),
-}
 SHORT_S, FIRST_OVER_S = 10.0, 14.0
 """The first push, and the first visit, are over [s]."""
 
@@ -52,10 +33,10 @@ def stranger(tmp_path_factory) -> RobotDescription:
     return robot_named(str(copied_panda(tmp_path_factory.mktemp("stranger"))))
 
 
-@pytest.fixture(scope="module", params=tuple(ARMS))
-def folder(request, tmp_path_factory) -> str:
-    place = tmp_path_factory.mktemp(request.param)
-    write_folder(import_robot(made.written(place, ARMS[request.param]), ImportOptions()), place / "arm")
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> str:
+    place, six = tmp_path_factory.mktemp("six"), made.six_axis(changed={k: {"limit": STRONG} for k in range(1, 7)})
+    write_folder(import_robot(made.written(place, six), ImportOptions()), place / "arm")
     return str(made.equipped(place / "arm"))
 
 

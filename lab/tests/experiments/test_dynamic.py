@@ -41,15 +41,3 @@ def test_three_pushes_are_as_long_and_as_strong_as_said_and_on_different_faces()
     inwards = [push.inwards for push in dynamic_pushes(7)]
     faces = [int(np.abs(way).argmax()) for way in inwards]
     assert len({(face, np.sign(way[face])) for face, way in zip(faces, inwards, strict=True)}) == 3
-
-
-@pytest.mark.slow
-def test_each_of_thirty_pushes_is_felt(context, panda_model):
-    contacts = []
-    for seed in range(310, 320):
-        row, record = dynamic.trial(PAPER, seed, context)
-        assert_within_limits(record, panda_model)
-        contacts += row["contacts"]
-    assert len(contacts) == 30
-    assert all(contact["detected"] for contact in contacts)
-    assert np.median([contact["direction_error_deg"] for contact in contacts]) < 15

@@ -69,26 +69,3 @@ def test_hard_restrictions_never_touch_what_the_skin_senses(context, panda_model
         assert 0.1 < nearest < 0.5
         assert row["least_sensed_m"] == pytest.approx(nearest, abs=1e-4)
         assert_within_limits(record, panda_model)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("trajectory", static.TRAJECTORIES)
-@pytest.mark.parametrize("side", static.SIDES)
-def test_the_papers_claim_on_ten_arms(context, panda_model, trajectory, side):
-    rows = {"blind": [], "paper": []}
-    for profile, found in rows.items():
-        for seed in range(200, 210):
-            row, record = static.trial(cell(profile, trajectory, side), seed, context)
-            assert_within_limits(record, panda_model)
-            found.append(row)
-    for found in rows.values():
-        assert all(row["contact"] and row["touched_link"] == "panda_hand" for row in found)
-        assert all(row["detection_delay_s"] is not None for row in found)
-        assert sum(row["false_detections"] for row in found) == 0
-
-    def ratio(measure):
-        return np.median([b[measure] / p[measure] for b, p in zip(rows["blind"], rows["paper"], strict=True)])
-
-    assert ratio("raw_at_detection_n") > 2
-    assert ratio("peak_estimate_n") > 2
-    assert ratio("filtered_at_detection_n") > 1

@@ -74,14 +74,6 @@ def test_a_contact_is_found_and_left_out():
     assert sigmas_off(found, 0, MADE.offset) < 4.0
 
 
-def test_without_velocities_the_rest_is_found_and_the_observer_kept(samples):
-    found = identify(replace(samples, qd=None), MODEL, USUAL)
-    assert sigmas_off(found, 0, MADE.offset) < 6.0
-    assert found.noise is None
-    assert found.fit.gain == USUAL.observer_gain_1_s
-    assert "observer_gain_1_s stay" in arm_toml(found, MODEL, "x")
-
-
 def test_samples_that_are_no_numbers_and_gaps_are_left_out_and_said(samples):
     tau = samples.tau.copy()
     tau[1000, 3] = np.nan
