@@ -11,39 +11,21 @@ from pretouch.robot.model import RobotModel
 from pretouch.sim.tcp_push import TcpPush
 
 
-def test_a_motion_ends_where_its_velocities_lead(serve, kind):
-    done = serve(kind).ask("move", 1.0)
-    assert done["error"] is None
-    assert done["after"]["mode"] == "idle"
-    assert done["told"][-1]["control_command_success_rate"] == 1.0
-    # the integral of 0.2 sin^2 over a second is 0.1
-    moved = np.subtract(done["after"]["q_d"], done["told"][0]["q_d"])
-    np.testing.assert_allclose(moved, [0.1, -0.05, 0.1, 0.0, 0.0, 0.1, -0.1], atol=3e-4)
-    np.testing.assert_allclose(done["after"]["q"], done["after"]["q_d"], atol=5e-3)
-
-
-def test_positions_lead_the_joints_and_those_begun_elsewhere_are_refused_by_the_vendors_name(serve, kind):
-    done, refused = serve(kind).ask("positions", 1.0)
+def test_positions_lead_the_joints(serve, kind):
+    done = serve(kind).ask("positions", 1.0)
     assert done["error"] is None
     assert done["after"]["mode"] == "idle"
     np.testing.assert_allclose(np.subtract(done["after"]["q_d"], done["told"][0]["q_d"]), 0.1, atol=1e-5)
     np.testing.assert_allclose(done["after"]["q"], done["after"]["q_d"], atol=5e-3)
-    assert "joint_position_motion_generator_start_pose_invalid" in refused["error"]
-    assert refused["after"]["last_motion_errors"] == ["joint_position_motion_generator_start_pose_invalid"]
-    np.testing.assert_array_equal(refused["after"]["q_d"], done["after"]["q_d"])
-    assert refused["recovered"]["mode"] == "idle"
 
 
-def test_velocities_and_poses_lead_the_end_effector_and_poses_begun_elsewhere_are_refused(serve, kind):
-    by_velocities, by_poses, refused = serve(kind).ask("cartesian", 1.0)
+def test_velocities_and_poses_lead_the_end_effector(serve, kind):
+    by_velocities, by_poses = serve(kind).ask("cartesian", 1.0)
     assert by_velocities["error"] is by_poses["error"] is None
     first = np.array(by_velocities["told"][0]["O_T_EE_d"])
-    there, back, stayed = (np.array(one["after"]["O_T_EE_d"]) for one in (by_velocities, by_poses, refused))
+    there, back = (np.array(one["after"]["O_T_EE_d"]) for one in (by_velocities, by_poses))
     np.testing.assert_allclose(there - first, 0.1 * np.eye(16)[13], atol=3e-4)
     np.testing.assert_allclose(back - there, -0.1 * np.eye(16)[13], atol=1e-5)
-    assert "cartesian_position_motion_generator_start_pose_invalid" in refused["error"]
-    np.testing.assert_allclose(stayed, back, atol=1e-6)
-    assert refused["recovered"]["mode"] == "idle"
 
 
 def test_states_tell_poses_and_what_the_flange_carries(serve, kind):

@@ -120,36 +120,28 @@ def move(lib, robot, kind, seconds, jump=0.0):
 
 
 def positions(lib, robot, kind, seconds):
-    """Move each joint by 0.1 rad through its positions; then once more, begun off by 0.2 rad."""
+    """Move each joint by 0.1 rad through its positions."""
+    begun = _fresh(robot)["q_d"]
 
-    def moved(off):
-        begun = _fresh(robot)["q_d"]
+    def command(state, time):
+        return [q + 0.1 * _share(time, seconds) for q in begun]
 
-        def command(state, time):
-            return [q + off + 0.1 * _share(time, seconds) for q in begun]
-
-        return _ran(lib, robot, kind, seconds, command, "joint_position")
-
-    return [moved(0.0), moved(0.2)]
+    return _ran(lib, robot, kind, seconds, command, "joint_position")
 
 
 def cartesian(lib, robot, kind, seconds):
-    """Move the end-effector by 0.1 m along y by velocities and back by poses; then once more, begun off by 0.01 m."""
+    """Move the end-effector by 0.1 m along y by velocities and back by poses."""
 
     def by_velocity(state, time):
         share = min(time / seconds, 1.0)
         return [0.0, 0.1 / seconds * (1 - math.cos(2 * math.pi * share)), 0.0, 0.0, 0.0, 0.0]
 
-    def by_poses(off):
-        there = _fresh(robot)["O_T_EE_d"]
-
-        def command(state, time):
-            return [*there[:13], there[13] + off - 0.1 * _share(time, seconds), *there[14:]]
-
-        return _ran(lib, robot, kind, seconds, command, "cartesian_pose")
+    def by_pose(state, time):
+        return [*there[:13], there[13] - 0.1 * _share(time, seconds), *there[14:]]
 
     by_velocities = _ran(lib, robot, kind, seconds, by_velocity, "cartesian_velocity", limited=True)
-    return [by_velocities, by_poses(0.0), by_poses(0.01)]
+    there = _fresh(robot)["O_T_EE_d"]
+    return [by_velocities, _ran(lib, robot, kind, seconds, by_pose, "cartesian_pose")]
 
 
 def hold(lib, robot, kind, seconds, force):
