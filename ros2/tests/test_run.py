@@ -63,23 +63,6 @@ def lines_until(process: subprocess.Popen[str], sign: str) -> list[str]:
     raise AssertionError("".join(said))
 
 
-def test_a_run_checks_yields_to_a_push_and_ends_at_rest(domain, tmp_path, arm):
-    confirmed(domain, tmp_path)
-    with running(domain, tmp_path, "--seconds", "5") as run:
-        said = lines_until(run, "TRACK")
-        arm.tell("push 0 0 20")
-        said += lines_until(run, "REACT")
-        arm.tell("push 0 0 0")
-        out, _ = run.communicate(timeout=LIMIT_S)
-    out = "".join(said) + out
-    assert run.returncode == 0, out
-    for part in ("All checks passed", "was confirmed before", "The arm is at rest.", "1 contact"):
-        assert part in out
-    log = arm.stop()
-    assert speeds(log).max() > 0.1
-    assert speeds(log)[-50:].max() < 1e-9
-
-
 killed_or_frozen = pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "frozen"])
 
 
