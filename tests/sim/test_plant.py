@@ -89,24 +89,6 @@ def test_at_rest_each_arm_has_its_own_constant_force_error(panda_model):
     assert np.all(offset.std(axis=0) > 0.4), "all arms err alike"
 
 
-@pytest.mark.parametrize(
-    ("point", "force"),
-    [
-        (LEFT, (0, -20, 0)), (LEFT, (15, 15, -15)), ((0.5, 0.0, 0.0), (10, 0, 0)), ((0.5, 0.0, 0.0), (-30, 0, 0)),
-        ((0.4, -0.3, 0.5), (0, 0, 30)),
-    ],
-)  # fmt: skip
-def test_a_push_at_the_hand_is_the_force_in_the_estimate(panda_model, point, force):
-    pushed, free = (arm(panda_model, seed=5, at=point) for _ in range(2))
-    push(pushed, panda_model.ee, np.array(point), np.array(force))
-    for plant in (pushed, free):
-        plant.advance(0.4)
-    estimate, error = mean_wrench(pushed), mean_wrench(free)
-    assert (estimate - error)[:3] == pytest.approx(np.array(force), abs=1.5)  # ripple of 0.2 Nm at 0.3 m, twice
-    assert estimate[:3] == pytest.approx(np.array(force), abs=4.0)
-    assert (estimate - error)[3:] == pytest.approx(np.zeros(3), abs=0.5)
-
-
 def test_a_perfect_arm_estimates_a_wrench_exactly(panda_model):
     plant = arm(panda_model, PERFECT, at=LEFT)
     assert mean_wrench(plant) == pytest.approx(np.zeros(6), abs=1e-6)
@@ -204,15 +186,6 @@ def test_torques_stay_within_the_limits_whatever_is_commanded(panda_model):
         largest = np.maximum(largest, np.abs(plant.mj_data.qfrc_applied[:7]))
     assert np.all(largest <= limit)
     assert np.all(largest[4:] == limit[4:]), "the command was too gentle to reach the limits"
-
-
-def test_time_split_differently_is_the_same_time(panda_model):
-    whole, pieces = arm(panda_model), arm(panda_model)
-    whole.advance(0.1)
-    for _ in range(20):
-        pieces.advance(0.005)
-    assert whole.time == pieces.time == pytest.approx(0.1)
-    assert np.array_equal(whole.read().tau_ext, pieces.read().tau_ext)
 
 
 def test_a_state_is_consistent_and_stays_as_it_was_read(panda_model):
