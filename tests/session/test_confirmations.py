@@ -1,6 +1,5 @@
 """The file of robots whose force sign is confirmed."""
 
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -43,18 +42,6 @@ def test_a_folder_that_cannot_be_made_is_a_sentence(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(RobotError, match=r"cannot be (read|noted)"):
         ConfirmedRobots(tmp_path / "file" / "folder").add(ROBOT)
-
-
-def test_writing_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
-    ConfirmedRobots(tmp_path).add(ROBOT)
-
-    def fail(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "replace", fail)
-    with pytest.raises(RobotError, match="No space left"):
-        ConfirmedRobots(tmp_path).add(Identity("fr3", "a", "b"))
-    assert ConfirmedRobots(tmp_path).is_confirmed(ROBOT)
 
 
 @pytest.mark.parametrize(("given", "wanted"), [("/some/where", Path("/some/where/pretouch")), ("relative", None)])
