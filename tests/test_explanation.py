@@ -7,6 +7,7 @@ import pytest
 
 from pretouch.explanation import Doing, Explanation, Limit, Limited, explain, finds, still
 from pretouch.modes import TABLE, Event, Transition
+from pretouch.robot.model import RobotModel
 from pretouch.types import (
     Contact,
     ControlStep,
@@ -18,6 +19,7 @@ from pretouch.types import (
     Touched,
     no_obstacles,
 )
+from tests.reporting import made
 
 UNITS, LINKS = ("hand_front", "hand_left"), ("link0", "link5", "hand")
 AHEAD = np.array([0.3, 0.0, 0.0])
@@ -37,19 +39,14 @@ def limited(slack: float = 0.0, multiplier: float = 1.0) -> QpSolution:
 
 
 @pytest.fixture
-def step() -> ControlStep:
+def step(panda_model: RobotModel) -> ControlStep:
     """Of an arm that follows its path at 0.3 m/s with nothing near."""
-    still, parts = np.zeros(3), np.zeros((6, 3))
+    parts, place = np.zeros((6, 3)), np.array([0.5, 0.25, 0.25])
     parts[0], parts[1], parts[2] = 11.0, -9.0, 1.0
     free = QpSolution(np.full(7, 0.2), np.zeros(0), np.zeros(7), QpOutcome.SOLVED, "solved")
-    return ControlStep(
-        stamp=4.0, mode=Mode.TRACK, event=Event.CLEAR, detail="", reason="Moving as requested.", latched=False,
-        q=np.zeros(7), q_commanded=np.zeros(7),
-        ee_position=np.array([0.5, 0.25, 0.25]), ee_velocity=AHEAD, path_position=np.array([0.5, 0.25, 0.25]),
-        path_phase=1.0, desired_velocity=AHEAD, speed_scale=1.0, range_distance=np.full(2, np.nan), obstacles=seen(),
-        force=still, filtered_force=still, thresholds=Thresholds(*parts), armed=True, contact=None,
-        reaction_velocity=still, restricted=np.zeros(0, int), approach_limit=np.zeros(0), qp=free, command=free.qd,
-        residual=np.full(7, np.nan), evidence=0.1,
+    return made.step(
+        panda_model, 2, 4.0, ee_position=place, path_position=place, ee_velocity=AHEAD, desired_velocity=AHEAD,
+        thresholds=Thresholds(*parts), qp=free, command=free.qd, evidence=0.1,
     )  # fmt: skip
 
 
