@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.contact.alone import PERIOD, StandingArm, means_of
 
 from pretouch.contact.detector import Body, Sample
+from pretouch.contact.residual_model import ResidualModel, resumed
 from pretouch.contact.scatter import (
     LENGTHS,
     MAXIMUM_OF,
@@ -107,6 +108,27 @@ def test_touches_that_no_unit_sees_raise_it_to_the_bound_at_most():
         return rng.gumbel(size=size) + (300.0 if rng.uniform() < 0.5 else 0.0)
 
     assert level_of(touched) == BOUND
+
+
+def test_a_gap_and_a_new_start_keep_the_stated_force_of_an_arm_that_sways(panda_model: RobotModel):
+    """Torques that last longer than noise count as scatter: a detector that forgets it states half of the force."""
+    arm, sway, stated = StandingArm(panda_model, MisfitParams(), 9), np.zeros(3), math.nan
+    state = arm.test.init(arm.body)
+    for _ in range(900):
+        sway = 0.98 * sway + 0.5 * arm.rng.standard_normal(3)
+        detection, state = arm.test.step(state, arm.body, arm.sample(sway))
+        stated = detection.detectable_n
+    model = arm.test.learnt(state)
+    again, anew = arm.test.init(arm.body, resumed(model, np.zeros(arm.body.model.n))), arm.test.init(arm.body)
+    forgetful = arm.test.init(arm.body, replace_misfit(model, arm.test.learnt(anew)))
+    first, lost = (arm.test.step(s, arm.body, arm.sample(np.zeros(3)))[0].detectable_n for s in (again, forgetful))
+    assert first == pytest.approx(stated, rel=0.02)
+    assert lost < 0.7 * stated
+
+
+def replace_misfit(model: ResidualModel, fresh: ResidualModel) -> ResidualModel:
+    """Return a model whose scatter and level are those of a fresh one."""
+    return model._replace(scatter=fresh.scatter, level=fresh.level)
 
 
 @pytest.mark.slow

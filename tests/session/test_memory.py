@@ -139,7 +139,7 @@ def test_it_adds_up_over_runs(file, arm, another):
         (lambda text: text[: len(text) // 2], "holds no free motion"),
         (lambda text: "", "missing required field `format`"),
         (lambda text: text.replace('arm = "panda"', 'arm = "fr3"'), "arm = 'fr3'"),
-        (lambda text: text.replace("format = 1", "format = 2"), "format = 2"),
+        (lambda text: text.replace("format = 2", "format = 3"), "format = 2"),
         (lambda text: text.replace("joint1", "joint9", 1), "has joints = "),
         (lambda text: re.sub(r"shape = \[\s*7,\s*12,?\s*\]", "shape = [7, 3]", text), "weights is not of the shape"),
         (lambda text: text.replace("172.16.0.2", "172.16.0.3"), "belongs to panda at 172.16.0.3"),
@@ -246,6 +246,7 @@ def changed(name, at, value):
         ("covariance", (6, 0, 0), 143.0, 1e6, "a variance of"),
         ("spread", (1, 1, 6), 143.0, 145.0, "a spread of 145, beyond the 144"),
         ("spread", (0, 0, 3), 9999.0, 1e6, "a spread of"),
+        ("scatter", (1, 5, 3, 3), 1e6, 1.1e6, "a scatter of"),
     ],
 )
 def test_what_an_arm_can_have_learnt_is_bounded(panda_model, name, at, possible, impossible, words):
@@ -257,9 +258,13 @@ def test_what_an_arm_can_have_learnt_is_bounded(panda_model, name, at, possible,
 
 def test_what_is_saved_comes_back(panda_model, tmp_path):
     model = FRESH._replace(weights=FRESH.weights + 0.5, queue=FRESH.queue + 1.0, waiting=np.full(1, 3))
+    model = model._replace(turning=FRESH.turning + 0.1, scatter=2.0 * FRESH.scatter, level=FRESH.level + 1.0)
     save_learnt(tmp_path / "a.toml", panda_model, model, "panda at home", 2.0)
     back, *about = load_learnt(tmp_path / "a.toml", panda_model, SequentialParams())
     assert np.all(back.weights == 0.5)
+    assert_array_equal(back.turning[1:], model.turning[1:])
+    assert_array_equal(back.scatter, model.scatter)
+    assert_array_equal(back.level[:, [0, 1, 4]], model.level[:, [0, 1, 4]])
     assert back.waiting[0] == 0
     assert not back.queue.any()
     assert about == ["panda at home", 2.0]
@@ -273,6 +278,9 @@ def test_what_is_saved_comes_back(panda_model, tmp_path):
         ("covariance", lambda a: a + np.where(np.eye(12)[::-1] == 1.0, np.inf, 0.0)),
         ("spread", lambda a: -a),
         ("seen", lambda a: -a - 1.0),
+        ("turning", lambda a: a - 1.0),
+        ("scatter", lambda a: 0.0 * a),
+        ("level", lambda a: a * np.nan),
     ],
 )
 def test_numbers_that_no_arm_can_have_are_refused(panda_model, name, change):

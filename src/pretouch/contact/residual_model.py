@@ -21,7 +21,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled, kernel
-from pretouch.contact.scatter import LONGEST, level_init, scatter_init
+from pretouch.contact.scatter import LENGTHS, LONGEST, level_init, scatter_init
 from pretouch.contact.sequential import MOST, Moment, alarm_bound
 from pretouch.params import ProximityPriorParams, SequentialParams
 from pretouch.records import IntCell, zeros
@@ -73,6 +73,12 @@ class ResidualModel(NamedTuple):
     """(2, 2, n) standing and moving, each A [(rad/s^2)^2] and D [Nm^2]."""
     seen: Annotated[FloatArray, 2]
     """(2,) number of samples of each; the file of a model has this name."""
+    turning: Annotated[FloatArray, 3, "n"]
+    """(3, n) further variance of the mean at hard accelerations, see `turning_init`."""
+    scatter: Annotated[FloatArray, 2, "W", "m", "n"]
+    """Scatter of the windows' means relative to that of white noise, see `scatter_init`."""
+    level: Annotated[FloatArray, 2, 5]
+    """Statistics for the level of an alarm, see `level_init`."""
     speed: Annotated[FloatArray, "n"]
     """(n,) commanded joint velocities, delayed as the torques [rad/s]."""
     queue: Annotated[FloatArray, "Q", "b"]
@@ -102,12 +108,6 @@ class SequentialState(NamedTuple):
     """(3 + n,) load or step of a joint's torque that explains a lasting residual, see `find_lasting`."""
     steady: IntCell
     """Samples that it has explained without obstacles, in a reaction or with a suspected contact; -1: it is learnt."""
-    turning: Annotated[FloatArray, 3, "n"]
-    """(3, n) further variance of the mean at hard accelerations, see `turning_init`."""
-    scatter: Annotated[FloatArray, 2, "W", "n + 2", "n"]
-    """Scatter of the windows' means relative to that of white noise, see `scatter_init`."""
-    level: Annotated[FloatArray, 2, 5]
-    """Statistics for the level of an alarm, see `level_init`."""
     settled: IntCell
     """Samples of free motion at rest."""
 
@@ -126,16 +126,27 @@ def prior_of(n: int, p: SequentialParams) -> FloatArray:
 def residual_init(n: int, p: SequentialParams) -> ResidualModel:
     """Return the model before the first sample: zero mean, wide spread."""
     spread = np.stack([np.full(n, p.velocity_prior_rad_s2**2), np.full(n, p.torque_prior_nm**2)])
-    none: ResidualModel = zeros(ResidualModel, n=n, f=features_of(n), Q=QUEUE, b=block_size(n))
-    return none._replace(covariance=np.tile(np.diag(prior_of(n, p)), (n, 1, 1)), spread=np.stack([spread, spread]))
+    none: ResidualModel = zeros(ResidualModel, n=n, m=n + 2, f=features_of(n), Q=QUEUE, b=block_size(n), W=len(LENGTHS))
+    covariance, misfit = np.tile(np.diag(prior_of(n, p)), (n, 1, 1)), (turning_init(n), scatter_init(n), level_init())
+    model = none._replace(covariance=covariance, spread=np.stack([spread, spread]))
+    return model._replace(turning=misfit[0], scatter=misfit[1], level=misfit[2])
+
+
+def resumed(model: ResidualModel, speed: FloatArray) -> ResidualModel:
+    """Return what a model has learnt, for samples after a gap that begin with commanded joint velocities (n,) [rad/s].
+
+    What belongs to successive samples is dropped: those that wait, the last accelerations, a block's largest ln R.
+    """
+    none, turning, level = np.zeros(1, np.int64), model.turning.copy(), model.level.copy()
+    turning[0] = level[:, 2:4] = 0.0
+    return model._replace(speed=speed, filled=none, waiting=none, turning=turning, level=level)
 
 
 def sequential_init(n: int, p: SequentialParams, learnt: ResidualModel | None = None) -> SequentialState:
     """Return the state of n joints before the first sample; `learnt` is the model of an earlier session."""
     none = np.zeros(1, np.int64)
-    model, ring, turning = residual_init(n, p) if learnt is None else learnt, np.zeros((LONGEST, n)), turning_init(n)
-    lasting = np.zeros(3 + n), none
-    return SequentialState(model, ring, none, none, none, *lasting, turning, scatter_init(n), level_init(), none)
+    model, ring, lasting = residual_init(n, p) if learnt is None else learnt, np.zeros((LONGEST, n)), np.zeros(3 + n)
+    return SequentialState(model, ring, none, none, none, lasting, none, none)
 
 
 def sequential_numbers(n: int, period: float, p: SequentialParams) -> SequentialNumbers:
@@ -253,7 +264,7 @@ def describe_free_motion(
         variance[j] += p.bias_floor_nm**2
         sample.residual[j] = sample.torque[j] - sample.mean[j]
     if p.widen_at_turns:
-        add_reversal_variance(sample.M, acceleration, state.turning, variance)
+        add_reversal_variance(sample.M, acceleration, model.turning, variance)
 
 
 @kernel

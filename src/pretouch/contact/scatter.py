@@ -195,7 +195,7 @@ def level_init() -> FloatArray:
 
     For each regime: both quantiles, the largest ln R of the present block, its samples, and the number of blocks.
     """
-    return np.tile([*_FIRST, -np.inf, 0.0, 0.0], (REGIMES, 1))
+    return np.tile([*_FIRST, 0.0, 0.0, 0.0], (REGIMES, 1))
 
 
 @kernel
@@ -212,7 +212,7 @@ def earned_level(maxima: FloatArray, bound: float, slack: float) -> float:
 @kernel
 def learn_level(log_r: float, maxima: FloatArray) -> None:
     """Add one sample of free motion to the memory of its regime (5,)."""
-    maxima[2], maxima[3] = max(maxima[2], log_r), maxima[3] + 1.0
+    maxima[2], maxima[3] = max(maxima[2], log_r) if maxima[3] else log_r, maxima[3] + 1.0
     if maxima[3] < MAXIMUM_OF:
         return
     step = max(maxima[1] - maxima[0], _LEAST_APART) / min(_PRIOR_MAXIMA + maxima[4], _MEMORY)
@@ -220,7 +220,7 @@ def learn_level(log_r: float, maxima: FloatArray) -> None:
     maxima[0] += _STEP * step * ((maxima[2] > maxima[0]) - (1.0 - _MIDDLE))
     maxima[1] += _STEP_HIGH * step * ((maxima[2] > maxima[1]) - (1.0 - _HIGH))
     maxima[1] = max(maxima[1], maxima[0] + _LEAST_APART)
-    maxima[2], maxima[3], maxima[4] = -np.inf, 0.0, maxima[4] + 1.0
+    maxima[3], maxima[4] = 0.0, maxima[4] + 1.0
 
 
 HELD_S = 0.1

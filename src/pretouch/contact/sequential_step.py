@@ -79,10 +79,10 @@ def assess_sample(
 
     Updates the state, and writes the results.
     """
-    arm, n, at, p, kin = mechanism.arm, len(now.qd), state.at[0], numbers.p, now.kin
+    arm, n, at, p, kin, model = mechanism.arm, len(now.qd), state.at[0], numbers.p, now.kin, state.model
     covariance, distance = results.covariance, now.obstacles.body_distance
     speed, mean, M, moving = np.empty(n), np.empty(n), np.empty((n, n)), np.zeros(1, np.int64)
-    x, variance = np.empty((n, state.model.weights.shape[1])), results.model_variance
+    x, variance = np.empty((n, model.weights.shape[1])), results.model_variance
     sample = FreeSample(now.tau_ext, results.residual, speed, x, M, mean, covariance, variance, moving)
     describe_free_motion(now, state, numbers, mechanism, sample)
     state.ring[at] = results.residual
@@ -99,7 +99,7 @@ def assess_sample(
     regime = 0 if settled * numbers.period >= _SETTLED_S else 1
     scatter, level = np.zeros((0, n + 2, n)), max(1.0, numbers.bound - p.slack_nats)
     if numbers.misfit_s > 0.0:
-        scatter, level = state.scatter[regime], earned_level(state.level[regime], numbers.bound, p.slack_nats)
+        scatter, level = model.scatter[regime], earned_level(model.level[regime], numbers.bound, p.slack_nats)
     means = means_in_free_motion(results.means, whole, covariance, results.model_variance, scatter)
     log_r, window, which = judge(means, contacts, p.contact_gain, p.tails)
     evidence = max(0.0, log_r / level)
@@ -113,7 +113,7 @@ def assess_sample(
     clear = len(distance) == 0 or distance[nearest_of(distance, 1)[0]] >= p.clear_m
     alone = clear and (numbers.learns == 2 or (numbers.learns == 1 and now.watched))
     if numbers.misfit_s > 0.0 and alone and not now.reacting and whole == len(LENGTHS):
-        learn_level(log_r, state.level[regime])
+        learn_level(log_r, model.level[regime])
     _learn(state, now.reacting, numbers, sample, means, J_ee, alone, evidence >= p.suspect)
 
     for j in range(n):  # only now: the learning uses the noise alone
@@ -121,11 +121,11 @@ def assess_sample(
     # the first n hypotheses, wrenches beyond a joint, have no direction
     away = contacts.away[max(which - n, 0)] if which >= n else np.zeros(3)
     _force_and_bands(J_ee, results.means[window], sample.mean, away, math.sqrt(2.0 * level), results)
-    state.model.speed[:], state.at[0] = sample.speed, (at + 1) % LONGEST
+    model.speed[:], state.at[0] = sample.speed, (at + 1) % LONGEST
     state.settled[0] = settled + 1 if alone and not now.reacting else settled
     if state.steady[0] < 0:  # the load that lasted is free motion now, and no contact
         evidence, results.force[:], results.samples[0] = 0.0, 0.0, 0
-        state.steady[0] = state.calm[0] = state.model.filled[0] = state.model.waiting[0] = 0
+        state.steady[0] = state.calm[0] = model.filled[0] = model.waiting[0] = 0
     state.samples[0] = results.samples[0]
     results.log_likelihood_ratio[0], results.lasting[0] = evidence, 1 if state.steady[0] > 0 else 0
 
@@ -147,7 +147,7 @@ def _learn(
     state.calm[0] = 0 if lost else min(state.calm[0] + 1, CALM)
     # also with a suspected contact: otherwise an alarm at a reversal would repeat at each of them
     if p.widen_at_turns and alone and not reacting and full:
-        learn_turning(at, means, period / p.memory_s, state.turning)
+        learn_turning(at, means, period / p.memory_s, model.turning)
     if numbers.misfit_s > 0.0 and alone and not reacting:
         learn_scatter(at, means, p.tails, period / numbers.misfit_s)
     if state.calm[0] >= CALM:

@@ -18,7 +18,7 @@ import numpy as np
 import tomli_w
 
 from pretouch.atomic_write import atomic_write
-from pretouch.contact.residual_model import PLAIN, ResidualModel, prior_of, residual_init
+from pretouch.contact.residual_model import PLAIN, ResidualModel, prior_of, residual_init, resumed
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError, RobotError, RobotModelError
@@ -29,14 +29,16 @@ from pretouch.toml_files import parse_toml
 from pretouch.types import FloatArray
 
 _SIGN_FILE, _FOLDER, _UNUSABLE = "force-sign.json", "free-motion", ".unusable"
-_FORMAT = 1
-_LASTING = ("weights", "covariance", "spread", "seen")
+_FORMAT = 2
+_LASTING = ("weights", "covariance", "spread", "seen", "turning", "scatter", "level")
 """Fields of a model of free motion that are saved."""
 _LATEST = 253_402_300_800.0
 """The year 10 000 [s since 1970]."""
 _ANEW = "let the arm learn its free motion again"
 _NOISIEST = 100.0
 """Noise of the measured joint velocities times the observer's gain [rad/s^2]: a real Panda's is 0.5."""
+_WIDEST = 1000.0
+"""Largest deviation of a window's mean by its scatter, as a factor on that by white noise."""
 _DRIFT = 0.25
 """Part of the prior's standard deviations that offset and friction may drift by while nobody looks: an arm cools."""
 _COOLING_S = 300.0  # an assumption
@@ -140,14 +142,13 @@ def load_learnt(path: Path, arm: RobotModel, p: SequentialParams) -> tuple[Resid
             raise RobotModelError(f"{path} has {key} = {getattr(stored, key)!r}, but {ours!r} is needed: {_ANEW}.")
     if not 0.0 <= stored.saved < _LATEST:
         raise RobotModelError(f"{path} was saved at the impossible time {stored.saved:g} s: {_ANEW}.")
-    fresh, arrays = residual_init(arm.n, p), list[FloatArray]()
+    fresh, arrays = residual_init(arm.n, p), dict[str, FloatArray]()
     for name in _LASTING:
         shape, array = getattr(fresh, name).shape, stored.array.get(name)
         if array is None or array.shape != list(shape) or len(array.values) != np.prod(shape):
             raise RobotModelError(f"{path}: {name} is not of the shape {shape}: {_ANEW}.")
-        arrays.append(np.array(array.values).reshape(shape))
-    weights, covariance, spread, count = arrays
-    learnt = fresh._replace(weights=weights, covariance=covariance, spread=spread, seen=count)
+        arrays[name] = np.array(array.values).reshape(shape)
+    learnt = resumed(fresh._replace(**arrays), fresh.speed)
     try:
         check_learnt(learnt, arm)
     except ParameterError as error:
@@ -158,11 +159,13 @@ def load_learnt(path: Path, arm: RobotModel, p: SequentialParams) -> tuple[Resid
 def check_learnt(learnt: ResidualModel, arm: RobotModel) -> None:
     """Refuse, by a ParameterError, a model that no free motion of an arm can have: it would hide every contact.
 
-    Covariances are symmetric and positive definite, variances and counts not below zero. Offset, friction and noise of
-    a joint stay within the torque it can give, the error of a link's mass within that mass, and an unknown load within
-    the mass of the arm. None is less certain than by its bound.
+    Covariances and scatters are symmetric and positive definite, variances and counts not below zero. Offset, friction
+    and noise of a joint stay within the torque it can give, the error of a link's mass within that mass, and an unknown
+    load within the mass of the arm. None is less certain than by its bound.
     """
-    if not np.isfinite(learnt.seen).all() or learnt.spread.min() < 0.0 or learnt.seen.min() < 0.0:
+    counts, scatter = (learnt.seen, learnt.turning, learnt.level[:, 3:]), learnt.scatter[:, :, : arm.n]
+    finite = all(np.isfinite(array).all() for array in (*counts, learnt.level, learnt.scatter))
+    if not finite or min(array.min() for array in (learnt.spread, *counts)) < 0.0:
         raise ParameterError("What was learnt has a variance or a count below zero: learn it anew.")
     torque, n = arm.description.tau_max, arm.n
     largest = np.column_stack([*[torque] * PLAIN, np.ones((n, n)), np.full(n, arm.mechanism.links.mass.sum())])
@@ -172,6 +175,7 @@ def check_learnt(learnt: ResidualModel, arm: RobotModel) -> None:
         ("weight", np.abs(learnt.weights), largest),
         ("variance", variance, largest**2),
         ("spread", learnt.spread.max(axis=0), noisiest),
+        ("scatter", np.diagonal(scatter, axis1=2, axis2=3).max(axis=1), np.full((2, n), _WIDEST**2)),
     ):
         at = np.unravel_index(int(np.argmax(values / bound)), bound.shape)
         if not values[at] <= bound[at]:
@@ -179,10 +183,10 @@ def check_learnt(learnt: ResidualModel, arm: RobotModel) -> None:
                 f"What was learnt has a {name} of {values[at]:.3g}, beyond the {bound[at]:.3g} that this arm can have:"
                 " learn it anew."
             )
-    covariance = learnt.covariance
-    symmetric = np.isfinite(covariance).all() and np.array_equal(covariance, covariance.swapaxes(1, 2))
-    if not symmetric or np.linalg.eigvalsh(covariance).min() <= 0.0:
-        raise ParameterError("What was learnt has a covariance that is none: learn it anew.")
+    for covariance in (learnt.covariance, scatter):
+        symmetric = np.isfinite(covariance).all() and np.allclose(covariance, covariance.swapaxes(-1, -2))
+        if not symmetric or np.linalg.eigvalsh(covariance).min() <= 0.0:
+            raise ParameterError("What was learnt has a covariance that is none: learn it anew.")
 
 
 def rested(model: ResidualModel, pause_s: float, p: SequentialParams) -> ResidualModel:
