@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 
 from pretouch.contact.detector import Body, Detection, Sample
-from pretouch.contact.scatter import LENGTHS, WindowMeans, means_in_free_motion
+from pretouch.contact.scatter import LENGTHS, WindowMeans, means_in_free_motion, scatter_init
 from pretouch.contact.sequential_test import SequentialTest, SequentialTestState
 from pretouch.contact.window import Window, add_force, window_init
-from pretouch.params import MisfitParams
 from pretouch.profiles import Profile
 from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
@@ -62,11 +61,14 @@ def standing(
     )
 
 
-def something(link: int, at: FloatArray, away: FloatArray, distance: float, ee_distance: float) -> Obstacles:
-    """One object so far from a place (3,) of a link's surface [m], in a direction (3,) away from it."""
+def something(
+    link: int, at: FloatArray, away: FloatArray, distance: float, ee_distance: float, closing: float = 0.0
+) -> Obstacles:
+    """One object so far from a place (3,) of a link's surface [m], in a direction (3,) away from it, coming closer."""
     return no_obstacles(1)._replace(
         point=(at + distance * away)[None], ee_distance=np.array([ee_distance]), body_point=at[None],
         link=np.array([link]), direction=away[None], body_distance=np.array([distance]),
+        closing_speed=np.array([closing]),
     )  # fmt: skip
 
 
@@ -83,15 +85,15 @@ def means_of(
     """Means (6, n) of residuals with noise (n, n), white without a scatter."""
     n = len(S)
     mean = np.zeros((len(LENGTHS), n)) if mean is None else mean
-    scatter = np.zeros((0, n + 2, n)) if scatter is None else scatter
+    scatter = scatter_init(n)[0] if scatter is None else scatter
     return means_in_free_motion(mean, whole, S, np.full(n, model_variance), scatter)
 
 
 class StandingArm:
     """A Panda at rest in one posture, with noise that no unit can have caused."""
 
-    def __init__(self, model: RobotModel, misfit: MisfitParams | None, seed: int) -> None:
-        self.test = SequentialTest(learn="always", misfit=misfit)
+    def __init__(self, model: RobotModel, seed: int) -> None:
+        self.test = SequentialTest(learn="always")
         self.body, self.rng = Body(model, Skin((), model), PERIOD), np.random.default_rng(seed)
         self.q = model.description.q_ready + self.rng.uniform(-0.4, 0.4, model.n)
         self.kin = model.kinematics(self.q)

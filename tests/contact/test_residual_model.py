@@ -99,7 +99,7 @@ def test_both_variances_are_found_from_samples(panda_model):
 
 
 def test_the_memory_is_bounded_and_the_prior_has_one_variance_a_feature():
-    assert len(prior_of(7, P)) == features_of(7) == 12
+    assert len(prior_of(7, P)) == features_of(7) == 13
     assert sum(a.nbytes for a in (residual_init(7, P).covariance, residual_init(7, P).queue)) < 20_000
 
 

@@ -17,8 +17,7 @@ from pretouch.contact.sequential import (
     explained_by_force,
     judge,
     log_ratio,
-    nearest_of,
-    nearness,
+    meeting,
 )
 from pretouch.params import SequentialParams
 from pretouch.types import FloatArray
@@ -139,24 +138,18 @@ def test_an_outlier_of_one_sample_is_less_to_a_test_with_heavy_tails():
     assert heavy < 0.3 * light
 
 
-# How much nearness raises the prior
+# How much an object that approaches raises the prior
 
 
-def test_nearness_by_numbers():
-    assert nearness(0.25, 0.0, 0.25, 0.2) == 0.0
-    assert nearness(0.125, 0.0, 0.25, 0.2) == pytest.approx(0.5)
-    # at 0.5 m/s it is 0.1 m nearer in 0.2 s
-    assert nearness(0.225, 0.5, 0.25, 0.2) == pytest.approx(0.5)
-    assert nearness(-0.02, 0.0, 0.25, 0.2) == 1.0
+def test_a_meeting_by_numbers():
+    # at 0.5 m/s it is 0.1 m nearer in 0.2 s: 0 and 4 deviations of 0.05 m
+    assert meeting(0.1, 0.5, 0.05, 0.2) == pytest.approx((0.5, 3.17e-5), rel=1e-3)
+    assert meeting(0.1, 0.0, 0.05, 0.2) == pytest.approx((0.02275, 0.02275), rel=1e-3)
+    assert meeting(-1.0, 0.1, 0.05, 0.2) == pytest.approx((1.0, 1.0))
 
 
 @given(st.floats(-0.1, 5.0), st.floats(-3.0, 3.0))
-def test_nearness_is_bounded_and_going_away_never_lowers_it_below_standing(distance, closing):
-    found = nearness(distance, closing, 0.25, 0.2)
-    assert nearness(distance, 0.0, 0.25, 0.2) <= found <= 1.0
-
-
-def test_the_nearest_objects_count():
-    nearest = [1, 3, 0, 4, 2]
-    for most in range(7):
-        assert nearest_of(np.array([0.3, 0.1, 0.5, 0.2, 0.4]), most).tolist() == nearest[:most]
+def test_only_what_approaches_meets(distance, closing):
+    touches, before = meeting(distance, closing, 0.05, 0.2)
+    assert 0.0 <= before <= touches <= 1.0
+    assert closing > 0.0 or touches == before

@@ -158,7 +158,7 @@ def test_a_touch_counts_for_an_object_that_is_seen_at_its_link_and_no_touch_chan
     for felt_by, touched in ((None, None), (skin, ()), (skin, (3,))):
         state = feel_init(panda_model, ours, felt_by)
         for k in range(5):
-            robot, seen = standing(panda_model, torque, stamp=0.02 * k), something(link, at, away, 0.01, 0.5)
+            robot, seen = standing(panda_model, torque, stamp=0.02 * k), something(link, at, away, 0.01, 0.5, 0.25)
             touches = None if touched is None else said(7, *touched, stamp=0.02 * k)
             felt, state = feel(state, panda_model, kin, robot, seen, False, ours, True, felt_by, touches)
         evidence.append(felt.evidence)

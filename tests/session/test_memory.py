@@ -1,7 +1,6 @@
 """What is remembered of a robot from one run to the next: its free motion, and bounds by physics on it."""
 
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -11,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from pretouch.contact.residual_model import residual_init
+from pretouch.contact.residual_model import RESTING, residual_init
 from pretouch.errors import ParameterError, RobotModelError
 from pretouch.params import SequentialParams
 from pretouch.profiles import PROFILES
@@ -75,7 +74,7 @@ def test_a_second_run_begins_with_what_the_first_has_learnt(file, arm, another):
     assert str(file.path) in said
     second = begun(file, another, now=1e9 + DAY_S)
     assert "this robot is known (3 s, saved 2001-09-09 01:46 UTC" in second.sentence
-    assert_array_equal(second.begin.weights, arm.state.learnt.weights)
+    assert_array_equal(np.delete(second.begin.weights, RESTING, 1), np.delete(arm.state.learnt.weights, RESTING, 1))
     again = turned(another, second, 100)
     assert residuals[0] > 1.0
     assert again[:50].max() < 0.3 * residuals[:50].max()
@@ -99,11 +98,11 @@ def test_the_doubt_of_offset_and_friction_grows_in_a_pause_and_that_of_masses_do
     at_once, later = (begun(file, arm, now=1e9 + pause).begin.covariance for pause in (0.0, DAY_S))
     prior = PROFILE.detect
     assert_array_equal(at_once, arm.state.learnt.covariance)
-    grown = (later - at_once)[:, range(12), range(12)]
+    grown = (later - at_once)[:, range(13), range(13)]
     assert np.all(grown[:, 0] > 0.4 * (0.25 * prior.offset_prior_nm) ** 2)
-    assert np.all(grown[:, 4:11] == 0.0)
+    assert np.all(grown[:, 5:12] == 0.0)
     assert np.all(later[:, 0, 0] < prior.offset_prior_nm**2)
-    np.testing.assert_allclose(later[:, 11, 11], prior.payload_prior_kg**2)
+    np.testing.assert_allclose(later[:, 12, 12], prior.payload_prior_kg**2)
     assert np.linalg.eigvalsh(later).min() > 0.0
     backwards = begun(file, arm, now=1e9 - DAY_S).begin.covariance  # the machine's time was set back
     np.testing.assert_allclose(backwards, later)
@@ -139,9 +138,9 @@ def test_it_adds_up_over_runs(file, arm, another):
         (lambda text: text[: len(text) // 2], "holds no free motion"),
         (lambda text: "", "missing required field `format`"),
         (lambda text: text.replace('arm = "panda"', 'arm = "fr3"'), "arm = 'fr3'"),
-        (lambda text: text.replace("format = 2", "format = 3"), "format = 2"),
+        (lambda text: text.replace("format = 2", "format = 3"), "format = 3"),
         (lambda text: text.replace("joint1", "joint9", 1), "has joints = "),
-        (lambda text: re.sub(r"shape = \[\s*7,\s*12,?\s*\]", "shape = [7, 3]", text), "weights is not of the shape"),
+        (lambda text: text.replace("\nweights = ", "\nothers = "), "weights is not of the shape"),
         (lambda text: text.replace("172.16.0.2", "172.16.0.3"), "belongs to panda at 172.16.0.3"),
         (lambda text: text.replace("saved = 1000000000.0", "saved = nan"), "the impossible time nan s"),
         (lambda text: text.replace("saved = 1000000000.0", "saved = 1e300"), "the impossible time 1e+300 s"),
@@ -242,11 +241,10 @@ def changed(name, at, value):
         ("weights", (6, 3), 12.0, 1e6, r"a weight of 1e\+06, beyond the 12"),
         ("weights", (0, 0), 0.0, np.nan, "a weight of nan"),
         ("weights", (2, 8), -1.0, -1.01, "a weight of 1.01, beyond the 1 "),
-        ("weights", (0, 11), 17.0, 18.0, "a weight of 18, beyond the 17.4"),  # kg of the arm
+        ("weights", (0, 12), 17.0, 18.0, "a weight of 18, beyond the 17.4"),  # kg of the arm
         ("covariance", (6, 0, 0), 143.0, 1e6, "a variance of"),
         ("spread", (1, 1, 6), 143.0, 145.0, "a spread of 145, beyond the 144"),
         ("spread", (0, 0, 3), 9999.0, 1e6, "a spread of"),
-        ("scatter", (1, 5, 3, 3), 1e6, 1.1e6, "a scatter of"),
     ],
 )
 def test_what_an_arm_can_have_learnt_is_bounded(panda_model, name, at, possible, impossible, words):
@@ -262,9 +260,8 @@ def test_what_is_saved_comes_back(panda_model, tmp_path):
     save_learnt(tmp_path / "a.toml", panda_model, model, "panda at home", 2.0)
     back, *about = load_learnt(tmp_path / "a.toml", panda_model, SequentialParams())
     assert np.all(back.weights == 0.5)
-    assert_array_equal(back.turning[1:], model.turning[1:])
-    assert_array_equal(back.scatter, model.scatter)
-    assert_array_equal(back.level[:, [0, 1, 4]], model.level[:, [0, 1, 4]])
+    for name in ("turning", "scatter", "level"):
+        assert_array_equal(getattr(back, name), getattr(model, name))
     assert back.waiting[0] == 0
     assert not back.queue.any()
     assert about == ["panda at home", 2.0]
@@ -274,8 +271,8 @@ def test_what_is_saved_comes_back(panda_model, tmp_path):
     ("name", "change"),
     [
         ("covariance", lambda a: 0.0 * a),
-        ("covariance", lambda a: a + np.triu(np.ones(12), 1)),
-        ("covariance", lambda a: a + np.where(np.eye(12)[::-1] == 1.0, np.inf, 0.0)),
+        ("covariance", lambda a: a + np.triu(np.ones(13), 1)),
+        ("covariance", lambda a: a + np.where(np.eye(13)[::-1] == 1.0, np.inf, 0.0)),
         ("spread", lambda a: -a),
         ("seen", lambda a: -a - 1.0),
         ("turning", lambda a: a - 1.0),

@@ -1,7 +1,12 @@
 """Learning of free motion: blocks of calm samples, recursive least squares, and the errors at hard accelerations.
 
-Samples are learnt in blocks, as their sums. A block waits in a queue until `QUEUE` more are full, and a suspected
-contact empties the queue: the beginning of a contact is never learnt.
+Samples are learnt in blocks, as their sums. A block waits in a queue until `QUEUE` more are full, and a reaction or an
+object that may touch empties the queue: the beginning of a contact that a unit sees is never learnt.
+
+Friction at rest is a weight that is learnt anew at each stop. In motion friction follows the velocity; a joint that
+stands holds any torque within the bounds of its friction F, and slides within a small way (presliding, Dahl 1968). So
+at rest friction is a constant with the variance F^2 / 3 of an even distribution, which becomes another one over the way
+of a motion (a process of Ornstein and Uhlenbeck). The commanded way counts, for motors push before a joint moves.
 """
 
 import numpy as np
@@ -12,6 +17,7 @@ from pretouch.contact.residual_model import (
     BLOCK,
     DEVIATION,
     QUEUE,
+    RESTING,
     FreeSample,
     ResidualModel,
     SequentialNumbers,
@@ -52,8 +58,7 @@ def add_to_block(model: ResidualModel, sample: FreeSample, ratio: FloatArray, p:
 
     With e = M v + d, of spread S = M A M^T + D, the sample's expectation of v_i^2 is (A M^T S^-1 e)_i^2 + A_i -
     A_i^2 (M^T S^-1 M)_ii, and that of d_i^2 alike with 1 in the place of M. The variance of the mean's error is in the
-    sample but not in D. `ratio` (n,) is the number of successive samples with as much information on the mean as one of
-    white noise; (0,): noise is white.
+    sample but not in D. So many samples in a row as `ratio` (n,) say as much on the mean as one with white noise.
     """
     block, spread, variance = model.block, model.spread[sample.moving[0]], sample.model_variance
     (n, f), floor = sample.x.shape, p.noise_floor_nm
@@ -81,9 +86,40 @@ def add_to_block(model: ResidualModel, sample: FreeSample, ratio: FloatArray, p:
         unit[i] = 0.0
         block[start + n + i] += max(jitter - variance[i] - floor**2, 0.0)
         # an outlier counts less, and an error that lasts for many samples counts as one sample
-        block[start + 2 * n + i] += S[i, i] / trust * max(1.0, ratio[i]) if len(ratio) else S[i, i]
+        block[start + 2 * n + i] += S[i, i] / trust * max(1.0, ratio[i])
     block[-2] += 1.0
     block[-1] = sample.moving[0]  # a block has the kind of its last sample
+
+
+STIRS_RAD_S = 0.002
+"""Commanded joint speed from which an arm at rest starts: friction reverses before it counts as moving [rad/s]."""
+
+
+@kernel
+def slide(model: ResidualModel, commanded: FloatArray, period: float, way: float) -> None:
+    """Forget the friction at rest over a `period` [s] at commanded joint velocities (n,) [rad/s], by `way` [rad].
+
+    Samples that wait were measured with the constant before: they count for the new one as far as both are the same.
+    """
+    n, f = model.weights.shape
+    for j in range(n):
+        speed = max(abs(commanded[j]), abs(model.speed[j]))
+        if speed <= STIRS_RAD_S:
+            continue
+        w, P, at = model.weights[j], model.covariance[j], n + j * f + RESTING
+        # the mean square of F: both terms of friction at full speed, with their uncertainty
+        square = (w[1] + w[2]) ** 2 + P[1, 1] + 2.0 * P[1, 2] + P[2, 2]
+        keep = np.exp(-speed * period / way)
+        new = (1.0 - keep * keep) * square / 3.0
+        w[RESTING] *= keep
+        for a in range(f):
+            P[a, RESTING] *= keep
+            P[RESTING, a] *= keep
+        P[RESTING, RESTING] += new
+        for k in range(model.waiting[0] + 1):
+            block = model.queue[k] if k < model.waiting[0] else model.block
+            block[n + n * f + 2 * n + j] += new * block[at] ** 2
+            block[at] *= keep
 
 
 @kernel

@@ -22,7 +22,7 @@ import numpy as np
 
 from pretouch.compiled import compiled, kernel
 from pretouch.contact.scatter import LENGTHS, LONGEST, level_init, scatter_init
-from pretouch.contact.sequential import MOST, Moment, alarm_bound
+from pretouch.contact.sequential import Moment, alarm_bound
 from pretouch.params import ProximityPriorParams, SequentialParams
 from pretouch.records import IntCell, zeros
 from pretouch.robot.kinematics import Kinematics, Mechanism, jacobian_into, mass_matrix_into, rotate
@@ -32,8 +32,10 @@ BLOCK = 4
 """Samples that are learnt together, as their sums."""
 QUEUE = 8
 """Blocks in the queue: 0.3 s at 100 Hz."""
-PLAIN = 4
+PLAIN = 5
 """Features before those of gravity."""
+RESTING = 4
+"""Feature of the friction at rest, see `learning`."""
 _SLOW, _FAST = 0.1, 0.3
 """Joint speeds over which friction reverses [rad/s]: between Coulomb's step and the 0.2 rad/s of a real Panda's."""
 _GRAVITY = 9.81
@@ -52,12 +54,8 @@ class SequentialNumbers(NamedTuple):
     """ln A of the test, see `alarm_bound`."""
     learns: int
     """Learning of free motion: 0 never, 1 while a skin watches, 2 always."""
-    objects: int
-    """Largest number of near objects that add a hypothesis."""
     settle: int
     """Samples after which a lasting residual is learnt, 0 for never."""
-    misfit_s: float
-    """Memory of the scatter of the windows' means, 0 if it is not learnt [s]."""
     prior: Annotated[FloatArray, "f"]
     """(f,) prior variances of the weights [Nm^2]."""
 
@@ -120,7 +118,8 @@ def features_of(n: int) -> int:
 def prior_of(n: int, p: SequentialParams) -> FloatArray:
     """Return the prior variances (f,) of the weights [Nm^2]."""
     friction = p.friction_prior_nm**2
-    return np.array([p.offset_prior_nm**2, friction, friction, friction, *[p.mass_prior**2] * n, p.payload_prior_kg**2])
+    plain = p.offset_prior_nm**2, friction, friction, friction, 2.0 / 3.0 * friction
+    return np.array([*plain, *[p.mass_prior**2] * n, p.payload_prior_kg**2])
 
 
 def residual_init(n: int, p: SequentialParams) -> ResidualModel:
@@ -132,16 +131,6 @@ def residual_init(n: int, p: SequentialParams) -> ResidualModel:
     return model._replace(turning=misfit[0], scatter=misfit[1], level=misfit[2])
 
 
-def resumed(model: ResidualModel, speed: FloatArray) -> ResidualModel:
-    """Return what a model has learnt, for samples after a gap that begin with commanded joint velocities (n,) [rad/s].
-
-    What belongs to successive samples is dropped: those that wait, the last accelerations, a block's largest ln R.
-    """
-    none, turning, level = np.zeros(1, np.int64), model.turning.copy(), model.level.copy()
-    turning[0] = level[:, 2:4] = 0.0
-    return model._replace(speed=speed, filled=none, waiting=none, turning=turning, level=level)
-
-
 def sequential_init(n: int, p: SequentialParams, learnt: ResidualModel | None = None) -> SequentialState:
     """Return the state of n joints before the first sample; `learnt` is the model of an earlier session."""
     none = np.zeros(1, np.int64)
@@ -151,11 +140,11 @@ def sequential_init(n: int, p: SequentialParams, learnt: ResidualModel | None = 
 
 def sequential_numbers(n: int, period: float, p: SequentialParams) -> SequentialNumbers:
     """Return the constants for compiled code, for n joints and a control period [s]."""
-    near = p.proximity or ProximityPriorParams()  # not used without objects
+    near = (p.proximity or ProximityPriorParams()).numbers._replace(**{} if p.proximity else {"gain": 0.0})
     delay, bound = math.exp(-p.observer_gain_1_s * period), alarm_bound(p, period)
-    learns, objects = ("never", "watched", "always").index(p.learn), MOST if p.proximity else 0
-    lasting = round(p.relearn_after_s / period) if p.learn != "never" else 0, p.misfit.memory_s if p.misfit else 0.0
-    return SequentialNumbers(p.numbers, near.numbers, period, delay, bound, learns, objects, *lasting, prior_of(n, p))
+    learns = ("never", "watched", "always").index(p.learn)
+    settle = round(p.relearn_after_s / period) if p.learn != "never" else 0
+    return SequentialNumbers(p.numbers, near, period, delay, bound, learns, settle, prior_of(n, p))
 
 
 def block_size(n: int) -> int:
@@ -167,8 +156,8 @@ def block_size(n: int) -> int:
 def features_into(kin: Kinematics, mechanism: Mechanism, speed: FloatArray, growth: FloatArray, x: FloatArray) -> None:
     """Write features (n, f) of each joint's mean torque, at joint velocities [rad/s] that grow by `growth` [rad/s^2].
 
-    1; tanh(qd / 0.1), tanh(qd / 0.3) and qd, friction with a smooth reversal; the torque of weight and inertia of
-    the links behind each joint, as point masses [Nm], and that of 1 kg at the end-effector.
+    1; tanh(qd / 0.1), tanh(qd / 0.3), qd and 1 - tanh(qd / 0.1)^2, friction in motion and at rest; the torque of weight
+    and inertia of the links behind each joint, as point masses [Nm], and that of 1 kg at the end-effector.
     """
     position, rotation, anchor, axis = kin
     moved_by, ee = mechanism.arm
@@ -178,7 +167,7 @@ def features_into(kin: Kinematics, mechanism: Mechanism, speed: FloatArray, grow
     x[:] = 0.0
     for j in range(n):
         x[j, 0], x[j, 1], x[j, 2] = 1.0, np.tanh(speed[j] / _SLOW), np.tanh(speed[j] / _FAST)
-        x[j, 3] = speed[j]
+        x[j, 3], x[j, RESTING] = speed[j], 1.0 - x[j, 1] ** 2
     for m in range(-1, len(mass)):  # -1: 1 kg at the end-effector, the payload
         last, link = PLAIN + n, m
         if m < 0:
@@ -263,8 +252,7 @@ def describe_free_motion(
     for j in range(n):
         variance[j] += p.bias_floor_nm**2
         sample.residual[j] = sample.torque[j] - sample.mean[j]
-    if p.widen_at_turns:
-        add_reversal_variance(sample.M, acceleration, model.turning, variance)
+    add_reversal_variance(sample.M, acceleration, model.turning, variance)
 
 
 @kernel

@@ -45,8 +45,7 @@ class WindowMeans(NamedTuple):
     model_variance: FloatArray
     """(n,) variance of the error of their mean [Nm^2]: it does not average out."""
     scatter: FloatArray
-    """(6, n + 2, n) scatter of each window's means, see `scatter_init`; (0, ...): none, and the fields below are not
-    written."""
+    """(6, n + 2, n) scatter of each window's means, see `scatter_init`."""
     whitened: FloatArray
     """(6, n) written: each window's mean, whitened by all but its scatter."""
     square: FloatArray
@@ -254,8 +253,7 @@ def detectable_force(
     covariance_of_mean(means, k, S)
     if not factor(S, L):
         return np.inf
-    if len(means.scatter):
-        spread_out(means.scatter[k], L, np.empty((n, n)))
+    spread_out(means.scatter[k], L, np.empty((n, n)))
     for a in range(3):
         forward(L, J[a, ::-1].copy(), A[a])  # the last joint first
     for a in range(3):

@@ -8,8 +8,9 @@ of free motion (Zellner 1986): with a prior as wide as all possible forces, a co
 would lose evidence by the others.
 
 **Hypotheses** are contacts in one posture, and their priors. An object adds hypotheses and removes none: a force on the
-body's point nearest to it, away from it. Their weight depends on how soon it may touch. An object that no unit sees, or
-with a reading too old for an obstacle, adds nothing, and all other contacts keep the weight they have without a skin.
+body's point nearest to it, away from it. Their weight is a hazard: the probability that both meet about now, by their
+distance, its error and the closing speed. An object that stands still beside an arm that does not approach it adds
+nothing, as one that no unit sees; all other contacts keep the weight they have without a skin.
 """
 
 import math
@@ -91,16 +92,14 @@ def judge(means: WindowMeans, contacts: Hypotheses, gain: float, tails: float) -
         covariance_of_mean(means, k, S0)
         if not factor(S0, L):
             continue
-        if len(scatter):
-            for i in range(n):
-                ratios[k, n - 1 - i] = z[i] ** 2 / S0[i, i]
-            forward(L, z, whitened[k])
-            spread_out(scatter[k], L, K)
+        for i in range(n):
+            ratios[k, n - 1 - i] = z[i] ** 2 / S0[i, i]
+        forward(L, z, whitened[k])
+        spread_out(scatter[k], L, K)
         for i in range(n):
             pivot[i] = 1.0 / L[i, i]
-        square, behind = forward(L, z, y), 0.0
-        if len(scatter):
-            squares[k] = square
+        squares[k] = square = forward(L, z, y)
+        behind = 0.0
         alone = np.log1p(square / tails)
         for h in range(n + len(J)):
             link, size, explained, one_sided = h, 3, 0.0, 1.0
@@ -196,18 +195,18 @@ def link_prior(mechanism: Mechanism) -> float:
 
 
 @kernel
-def hypotheses(now: Moment, mechanism: Mechanism, most: int, near: ProximityPriorParams) -> Hypotheses:
+def hypotheses(now: Moment, mechanism: Mechanism, near: ProximityPriorParams) -> tuple[Hypotheses, float]:
     """Return the hypotheses: any wrench beyond each joint, a force on each link, one by each of the nearest objects.
 
-    At most `most` objects count. All weights are multiplied by the touch gain of the link; of several links behind one
-    joint the largest gain counts.
+    At most `MOST` objects count. All weights are multiplied by the touch gain of the link; of several links behind one
+    joint the largest gain counts. The second value is the largest probability of a touch a horizon from now.
     """
     obstacles, touch_gain, qd = now.obstacles, now.touch_gain, now.qd
     position, rotation, anchor, axis = now.kin
     moved_by, parts, middle = mechanism.arm.moved_by, mechanism.links.parts, mechanism.links.middle
     distance, direction = obstacles.body_distance, obstacles.direction
     n, count, full, point = len(anchor), len(parts), np.empty((6, len(anchor))), np.empty(3)
-    order, k = nearest_of(distance, most), 0
+    order, k, touching = np.argsort(distance)[:MOST], 0, 0.0
     size = count + len(order)
     J, joints, weight, away = np.empty((size, 3, n)), np.empty(size, np.int64), np.empty(n + size), np.zeros((size, 3))
     # joints and links share a weight of 1, without the objects: half for any wrench on a link, which moves the joints
@@ -237,35 +236,21 @@ def hypotheses(now: Moment, mechanism: Mechanism, most: int, near: ProximityPrio
                 away[h, a] = -direction[k, a]
                 for j in range(n):
                     speed += direction[k, a] * J[h, a, j] * qd[j]
-            weight[n + h] = near.gain * nearness(distance[k], speed, near.distance_m, near.horizon_s) * touch_gain[link]
-    return Hypotheses(J, joints, weight, away)
+            touches, before = meeting(distance[k], speed, near.error_m, near.horizon_s)
+            weight[n + h] = near.gain * (touches - before) * touch_gain[link]
+            touching = max(touching, touches)
+    return Hypotheses(J, joints, weight, away), touching
 
 
 @kernel
-def nearness(distance: float, closing: float, near: float, horizon: float) -> float:
-    """Return the nearness of a touch, from 0 (not near) to 1 (touches within `horizon` [s]).
+def meeting(distance: float, closing: float, error: float, horizon: float) -> tuple[float, float]:
+    """Return the probabilities that an object touches the body a `horizon` [s] from now, and that it did one ago.
 
-    `distance` [m] is from the body's surface, `closing` [m/s] the speed at which it shrinks; a growing distance counts
-    as constant.
+    `distance` [m] is from the body's surface, with a standard deviation `error` [m]; `closing` [m/s] is the speed at
+    which it shrinks. A growing distance counts as constant.
     """
-    ahead = distance - max(closing, 0.0) * horizon
-    return min(max(1.0 - ahead / near, 0.0), 1.0)
-
-
-@kernel
-def nearest_of(distance: FloatArray, most: int) -> IntArray:
-    """Return the indices of the smallest distances (K,), at most `most` of them, the nearest first."""
-    nearest, count = np.empty(min(most, len(distance)), np.int64), 0
-    for k in range(len(distance) if len(nearest) else 0):
-        i = min(count, len(nearest) - 1)
-        if count == len(nearest) and not distance[k] < distance[nearest[i]]:
-            continue
-        while i > 0 and distance[k] < distance[nearest[i - 1]]:
-            nearest[i] = nearest[i - 1]
-            i -= 1
-        nearest[i] = k
-        count = min(count + 1, len(nearest))
-    return nearest
+    way, unit = max(closing, 0.0) * horizon, math.sqrt(2.0) * error
+    return 0.5 * math.erfc((distance - way) / unit), 0.5 * math.erfc((distance + way) / unit)
 
 
 _DAMPING = 0.02

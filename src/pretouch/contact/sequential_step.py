@@ -12,7 +12,7 @@ import numpy as np
 
 from pretouch.compiled import compiled, inlined, kernel
 from pretouch.contact.lasting_load import follow_lasting
-from pretouch.contact.learning import add_to_block, learn_turning, queue_block
+from pretouch.contact.learning import STIRS_RAD_S, add_to_block, learn_turning, queue_block, slide
 from pretouch.contact.residual_model import (
     BLOCK,
     QUEUE,
@@ -32,17 +32,17 @@ from pretouch.contact.scatter import (
     means_in_free_motion,
     window_means,
 )
-from pretouch.contact.sequential import Moment, force_map_into, hypotheses, judge, link_prior, nearest_of
+from pretouch.contact.sequential import Moment, force_map_into, hypotheses, judge, link_prior
 from pretouch.records import Cell, IntCell
 from pretouch.robot.kinematics import Mechanism, below, jacobian_into
 from pretouch.types import FloatArray
 
 CALM = BLOCK * QUEUE
 """Calm samples before the first one is learnt."""
+_UNLIKELY = 0.02
+"""Probability of a touch by an object below which free motion is learnt."""
 _SETTLED_S = 10.0
 """Time at rest with learning of free motion after which a posture's offsets count as learnt [s]."""
-_STIRS_RAD_S = 0.002
-"""Joint speed from which an arm at rest starts: friction reverses before it counts as moving [rad/s]."""
 
 
 class SampleTest(NamedTuple):
@@ -84,6 +84,7 @@ def assess_sample(
     speed, mean, M, moving = np.empty(n), np.empty(n), np.empty((n, n)), np.zeros(1, np.int64)
     x, variance = np.empty((n, model.weights.shape[1])), results.model_variance
     sample = FreeSample(now.tau_ext, results.residual, speed, x, M, mean, covariance, variance, moving)
+    slide(model, now.qd_commanded, numbers.period, p.presliding_rad)
     describe_free_motion(now, state, numbers, mechanism, sample)
     state.ring[at] = results.residual
     results.samples[0] = min(state.samples[0] + 1, LONGEST)
@@ -92,14 +93,12 @@ def assess_sample(
 
     # The test against contacts of each joint, of each link and of the nearest objects: R is the sum of prior weights
     # times likelihood ratios, A the level that it exceeds at the chosen rate of false alarms.
-    contacts = hypotheses(now, mechanism, numbers.objects, numbers.near)
-    settled = state.settled[0] if below(sample.speed, _STIRS_RAD_S) else 0
+    contacts, touching = hypotheses(now, mechanism, numbers.near)
+    settled = state.settled[0] if below(sample.speed, STIRS_RAD_S) else 0
     # At rest the offsets of a posture are learnt in seconds; until then the errors are as in motion. Time without
     # learning, with somebody near, does not count.
     regime = 0 if settled * numbers.period >= _SETTLED_S else 1
-    scatter, level = np.zeros((0, n + 2, n)), max(1.0, numbers.bound - p.slack_nats)
-    if numbers.misfit_s > 0.0:
-        scatter, level = model.scatter[regime], earned_level(model.level[regime], numbers.bound, p.slack_nats)
+    scatter, level = model.scatter[regime], earned_level(model.level[regime], numbers.bound, p.slack_nats)
     means = means_in_free_motion(results.means, whole, covariance, results.model_variance, scatter)
     log_r, window, which = judge(means, contacts, p.contact_gain, p.tails)
     evidence = max(0.0, log_r / level)
@@ -110,11 +109,11 @@ def assess_sample(
         J_ee, numbers.period, means, level - link_prior(mechanism), p.contact_gain, p.tails
     )
     # no learning while an obstacle could cause the torques
-    clear = len(distance) == 0 or distance[nearest_of(distance, 1)[0]] >= p.clear_m
-    alone = clear and (numbers.learns == 2 or (numbers.learns == 1 and now.watched))
-    if numbers.misfit_s > 0.0 and alone and not now.reacting and whole == len(LENGTHS):
+    alone = touching < _UNLIKELY and (numbers.learns == 2 or (numbers.learns == 1 and now.watched))
+    clear = not np.any(distance < p.clear_m)
+    if alone and not now.reacting and whole == len(LENGTHS):
         learn_level(log_r, model.level[regime])
-    _learn(state, now.reacting, numbers, sample, means, J_ee, alone, evidence >= p.suspect)
+    _learn(state, now.reacting, numbers, sample, means, J_ee, (alone, clear), evidence >= p.suspect)
 
     for j in range(n):  # only now: the learning uses the noise alone
         covariance[j, j] += results.model_variance[j]
@@ -133,31 +132,30 @@ def assess_sample(
 @inlined
 def _learn(
     state: SequentialState, reacting: bool, numbers: SequentialNumbers, sample: FreeSample, means: WindowMeans,
-    J: FloatArray, alone: bool, suspected: bool,
+    J: FloatArray, free: tuple[bool, bool], suspected: bool,
 ) -> None:  # fmt: skip
     """Learn from a sample; update the counts of calm and lasting samples.
 
-    `J` (6, n) is the Jacobian of the end-effector, `alone` says whether no obstacle can touch the arm, `suspected`
-    whether a contact is suspected.
+    `J` (6, n) is the Jacobian of the end-effector, `free` says whether no obstacle touches the arm and whether none is
+    near it, `suspected` whether a contact is suspected.
     """
     model, p, period, at, full = state.model, numbers.p, numbers.period, state.at[0], means.whole == len(LENGTHS)
-    # Samples before a suspected contact may be its beginning: they are dropped, not learnt. Where misfit is learnt,
-    # they only have less weight: a spread without unexpected samples shrinks, and expects fewer and fewer.
-    lost = (suspected and numbers.misfit_s == 0.0) or reacting or not alone
-    state.calm[0] = 0 if lost else min(state.calm[0] + 1, CALM)
-    # also with a suspected contact: otherwise an alarm at a reversal would repeat at each of them
-    if p.widen_at_turns and alone and not reacting and full:
+    alone, clear = free
+    # Unexpected samples are not dropped, but have less weight: a spread without them shrinks, and expects fewer and
+    # fewer, and an alarm at a reversal would repeat at each of them.
+    learns = alone and not reacting
+    state.calm[0] = min(state.calm[0] + 1, CALM) if learns else 0
+    if learns and full:
         learn_turning(at, means, period / p.memory_s, model.turning)
-    if numbers.misfit_s > 0.0 and alone and not reacting:
-        learn_scatter(at, means, p.tails, period / numbers.misfit_s)
+        learn_scatter(at, means, p.tails, period / p.scatter_memory_s)
     if state.calm[0] >= CALM:
-        add_to_block(model, sample, means.scatter[-1, -1] if numbers.misfit_s > 0.0 else np.zeros(0), p)
+        add_to_block(model, sample, means.scatter[-1, -1], p)
         queue_block(model, numbers)
     else:
         model.filled[0] = model.waiting[0] = 0
     # a lasting residual matters only if it disturbs the arm; calm samples learn it anyway
     unclear = state.steady[0] > 0 or suspected or reacting
-    if numbers.settle > 0 and alone and full and (state.calm[0] < CALM or suspected) and unclear:
+    if numbers.settle > 0 and alone and clear and full and (state.calm[0] < CALM or suspected) and unclear:
         follow_lasting(state, reacting, suspected, numbers, sample, means, J)
     else:
         state.steady[0] = 0

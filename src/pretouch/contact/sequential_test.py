@@ -120,16 +120,11 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
             tested, _ = self._assess(state, body, sample, cues)
             return bool(tested.log_likelihood_ratio[0] >= 1.0)
 
-        largest = 0.0
-        for axis in np.eye(3):
-            if not is_detected(_LARGEST_N * axis):
-                return np.inf
-            low, high = 0.0, _LARGEST_N
-            while high - low > _TO_N:
-                middle = 0.5 * (low + high)
-                low, high = (low, middle) if is_detected(middle * axis) else (middle, high)
-            largest = max(largest, high)
-        return largest
+        low, high = 0.0, 2.0 * _LARGEST_N
+        while high - low > _TO_N:
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if all(map(is_detected, middle * np.eye(3))) else (middle, high)
+        return high if high < _LARGEST_N else np.inf
 
 
 def _test_of(state: SequentialTestState) -> SequentialState:

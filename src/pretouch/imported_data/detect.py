@@ -10,7 +10,6 @@ from pretouch.composition import changed
 from pretouch.contact.detector import Body, Detection, Detector, Sample
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.reaction import DecayingVelocity
-from pretouch.contact.residual_model import resumed
 from pretouch.contact.window import Window, add_force, window_init
 from pretouch.errors import RecordingError
 from pretouch.imported_data.log import Note
@@ -260,7 +259,8 @@ def _sample(r: TorqueRecording, i: int, time: float, window: Window, profile: Pr
 def _begun(detector: Detector, body: Body, before: Any, speed: FloatArray) -> Any:
     """Return a detector's state at the first cycle with torques after a gap: what was learnt stays."""
     learnt = detector.learnt(detector.init(body) if before is None else before)
-    return detector.init(body, learnt and resumed(learnt, speed))
+    none = np.zeros(1, np.int64)
+    return detector.init(body, learnt and learnt._replace(speed=speed, filled=none, waiting=none))
 
 
 def _follow(contacts: list[DetectedContact], model: RobotModel, time: float, d: Detection) -> None:

@@ -12,7 +12,6 @@ from pretouch.checks import Check, Checked, Fraction, Negative, NonNegative, Pos
 from pretouch.errors import ParameterError
 from pretouch.params.pretouch import BrakingParams as BrakingParams
 from pretouch.params.pretouch import LocalisationParams as LocalisationParams
-from pretouch.params.pretouch import MisfitParams as MisfitParams
 from pretouch.params.pretouch import NullSpaceMotion as NullSpaceMotion
 from pretouch.params.pretouch import ProximityPriorParams as ProximityPriorParams
 from pretouch.params.pretouch import SequentialParams as SequentialParams

@@ -12,13 +12,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
 import tomli_w
 
 from pretouch.atomic_write import atomic_write
-from pretouch.contact.residual_model import PLAIN, ResidualModel, prior_of, residual_init, resumed
+from pretouch.contact.residual_model import PLAIN, RESTING, ResidualModel, prior_of, residual_init
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError, RobotError, RobotModelError
@@ -26,7 +27,6 @@ from pretouch.loop import Cycle
 from pretouch.params import SequentialParams
 from pretouch.robot.model import RobotModel
 from pretouch.toml_files import parse_toml
-from pretouch.types import FloatArray
 
 _SIGN_FILE, _FOLDER, _UNUSABLE = "force-sign.json", "free-motion", ".unusable"
 _FORMAT = 2
@@ -37,8 +37,6 @@ _LATEST = 253_402_300_800.0
 _ANEW = "let the arm learn its free motion again"
 _NOISIEST = 100.0
 """Noise of the measured joint velocities times the observer's gain [rad/s^2]: a real Panda's is 0.5."""
-_WIDEST = 1000.0
-"""Largest deviation of a window's mean by its scatter, as a factor on that by white noise."""
 _DRIFT = 0.25
 """Part of the prior's standard deviations that offset and friction may drift by while nobody looks: an arm cools."""
 _COOLING_S = 300.0  # an assumption
@@ -101,13 +99,6 @@ class ConfirmedRobots:
             raise RobotError(f"The file {self.path} is damaged: delete it, and repeat the guided pushes.") from None
 
 
-class _StoredArray(msgspec.Struct):
-    """An array in a file of free motion."""
-
-    shape: list[int]
-    values: list[float]
-
-
 class _StoredMotion(msgspec.Struct):
     """A file of free motion."""
 
@@ -118,13 +109,12 @@ class _StoredMotion(msgspec.Struct):
     """Robot that the model was learnt on, as `panda at 172.16.0.2`."""
     saved: float
     """Time of writing [s since 1970, UTC]."""
-    array: dict[str, _StoredArray]
+    array: dict[str, list[Any]]
 
 
 def save_learnt(path: Path, arm: RobotModel, learnt: ResidualModel, robot: str, saved: float) -> None:
     """Write a file of free motion; one that is there is replaced whole or, with an OSError, not at all."""
-    arrays = {name: getattr(learnt, name) for name in _LASTING}
-    stored = {name: _StoredArray(list(a.shape), a.reshape(-1).tolist()) for name, a in arrays.items()}
+    stored = {name: getattr(learnt, name).tolist() for name in _LASTING}
     file = _StoredMotion(_FORMAT, arm.description.name, list(arm.joints), robot, saved, stored)
     atomic_write(path, tomli_w.dumps(msgspec.to_builtins(file)))
 
@@ -133,22 +123,21 @@ def load_learnt(path: Path, arm: RobotModel, p: SequentialParams) -> tuple[Resid
     """Read a file of free motion: model, robot, instant of saving; one that cannot be used is a RobotModelError."""
     try:
         stored = msgspec.convert(parse_toml(path.read_bytes()), _StoredMotion)
+        arrays = {name: np.array(array, np.float64) for name, array in stored.array.items()}
     except OSError as error:
         raise RobotModelError(f"The file {path} cannot be read: {error.strerror}: give one that was saved.") from error
-    except (ValueError, msgspec.MsgspecError) as error:  # not of TOML, not UTF-8, or of something else
+    except (ValueError, TypeError, msgspec.MsgspecError) as error:  # not of TOML, not UTF-8, or of something else
         raise RobotModelError(f"The file {path} holds no free motion: {error}: {_ANEW}.") from error
     for key, ours in (("format", _FORMAT), ("arm", arm.description.name), ("joints", list(arm.joints))):
         if getattr(stored, key) != ours:
             raise RobotModelError(f"{path} has {key} = {getattr(stored, key)!r}, but {ours!r} is needed: {_ANEW}.")
     if not 0.0 <= stored.saved < _LATEST:
         raise RobotModelError(f"{path} was saved at the impossible time {stored.saved:g} s: {_ANEW}.")
-    fresh, arrays = residual_init(arm.n, p), dict[str, FloatArray]()
+    fresh = residual_init(arm.n, p)
     for name in _LASTING:
-        shape, array = getattr(fresh, name).shape, stored.array.get(name)
-        if array is None or array.shape != list(shape) or len(array.values) != np.prod(shape):
-            raise RobotModelError(f"{path}: {name} is not of the shape {shape}: {_ANEW}.")
-        arrays[name] = np.array(array.values).reshape(shape)
-    learnt = resumed(fresh._replace(**arrays), fresh.speed)
+        if name not in arrays or arrays[name].shape != getattr(fresh, name).shape:
+            raise RobotModelError(f"{path}: {name} is not of the shape {getattr(fresh, name).shape}: {_ANEW}.")
+    learnt = fresh._replace(**{name: arrays[name] for name in _LASTING})
     try:
         check_learnt(learnt, arm)
     except ParameterError as error:
@@ -175,7 +164,6 @@ def check_learnt(learnt: ResidualModel, arm: RobotModel) -> None:
         ("weight", np.abs(learnt.weights), largest),
         ("variance", variance, largest**2),
         ("spread", learnt.spread.max(axis=0), noisiest),
-        ("scatter", np.diagonal(scatter, axis1=2, axis2=3).max(axis=1), np.full((2, n), _WIDEST**2)),
     ):
         at = np.unravel_index(int(np.argmax(values / bound)), bound.shape)
         if not values[at] <= bound[at]:
@@ -192,17 +180,19 @@ def check_learnt(learnt: ResidualModel, arm: RobotModel) -> None:
 def rested(model: ResidualModel, pause_s: float, p: SequentialParams) -> ResidualModel:
     """Return the model after a pause [s]: the mean as it was, its covariance larger, the noise covariance as it was.
 
-    Within minutes the covariance of offset and friction goes part of the way to the prior, and that of the payload all
-    of it, for what the arm holds may be another. The links' masses stay what they are.
+    Within minutes the covariance of offset and friction goes part of the way to the prior. Those of the payload and of
+    the friction at rest go all of it, for the arm may have moved and hold something else. The links' masses stay what
+    they are.
     """
     n = len(model.weights)
     prior, lost = prior_of(n, p), -math.expm1(-max(pause_s, 0.0) / _COOLING_S)
     share = np.zeros(len(prior))
-    share[:PLAIN], share[-1] = _DRIFT**2 * lost, lost
-    left = np.sqrt(1.0 - share)
+    share[:PLAIN], share[[RESTING, -1]] = _DRIFT**2 * lost, lost
+    left, weights = np.sqrt(1.0 - share), model.weights.copy()
+    weights[:, RESTING] *= left[RESTING]
     # scaled from both sides, by which it stays positive definite: of each variance a share is replaced by the prior's
     covariance = model.covariance * (left[:, None] * left) + np.diag(share * prior)
-    return model._replace(covariance=covariance)
+    return model._replace(weights=weights, covariance=covariance)
 
 
 @dataclass(frozen=True)

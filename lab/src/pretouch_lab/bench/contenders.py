@@ -32,8 +32,6 @@ OFF = {
     "detect.proximity": "none",
     "detect.touch": "none",
     "detect.learn": "never",
-    "detect.widen_at_turns": "no",
-    "detect.misfit": "none",
     "detect.localise": "none",
     "react": "decay",
     "react.clamp": "none",

@@ -192,7 +192,9 @@ def close_up(traces: list[Trace], units: tuple[str, ...]) -> Figure:
     paper = isinstance(detector, MovingThresholds)
     if isinstance(detector, SequentialTest):
         near = detector.proximity or near
-    d_max, name = (detector.d_max_m, "d_max") if isinstance(detector, MovingThresholds) else (near.distance_m, "near")
+    d_max, name = (
+        (detector.d_max_m, "d_max") if isinstance(detector, MovingThresholds) else (2.0 * near.error_m, "near")
+    )
     top.axhspan(0.0, d_max, facecolor="gold", alpha=0.18, zorder=0)
     top.axhline(d_max, color="black", ls=":", lw=2.5, label=f"{name} {d_max:g} m")
     top.annotate("region of interest", (0.01, d_max), (0, -5), ("axes fraction", "data"), "offset points", va="top")
