@@ -131,10 +131,6 @@ def test_it_is_bounded():
     assert turned(4000, 50.0, HARD)[1] <= 25.0
 
 
-def test_without_hard_acceleration_there_is_none():
-    assert not turned(400, 0.5, np.array([1.5, -1.5])).any()
-
-
 def test_it_is_gone_soon_after():
     turning = turning_init(2)
     turning[1] = 0.01

@@ -107,19 +107,6 @@ def test_the_expectation_of_the_statistic_in_free_motion_is_the_sum_of_the_weigh
     assert np.mean(total) == pytest.approx(1.0, abs=0.03)
 
 
-def test_false_alarms_on_noise_stay_within_the_bound():
-    rng, S, p = np.random.default_rng(6), spread(), SequentialParams(false_alarms_per_hour=3600.0)
-    L, ring, weight = np.linalg.cholesky(S), np.zeros((LONGEST, N)), np.full(N, 1.0 / N)
-    passed, samples, level = 0, 20_000, alarm_bound(p, 0.01)
-    for i in range(samples):
-        ring[i % LONGEST] = L @ rng.standard_normal(N)
-        means = np.zeros((len(LENGTHS), N))
-        whole = window_means(ring, (i + 1) % LONGEST, min(i + 1, LONGEST), means)
-        log_r, _, _ = judge(means_of(S, mean=means, whole=whole), no_point(weight), 15.0, 30.0)
-        passed += log_r >= level
-    assert passed <= samples * 0.01 * 1.0  # one a second is the bound
-
-
 def test_a_push_is_found_and_its_window_is_that_of_its_length():
     means = np.zeros((len(LENGTHS), N))
     means[:] = 0.1
