@@ -35,9 +35,9 @@ def test_what_was_read_assumed_and_found_is_printed_and_on_a_page(capsys, file, 
     assert "Without a skin no obstacle is known" in said
     rows = [line.split() for line in said.splitlines() if line.startswith("paper ")]
     assert [row[-1] for row in rows[:3]] == ["y", "x", "z"]
-    assert "paper: if nobody touched the arm, 3 false contacts in 0.2 min" in said
+    assert "paper: 3 contacts in 0.2 min; if nobody touched the arm, 831 false alarms an hour; an F_b above" in said
     assert f"Page: {page}" in said
-    assert "3 false contacts" in page.read_text()
+    assert "831 false alarms" in page.read_text()
     assert page.read_text().count("<img src=") == 1
 
 
@@ -57,7 +57,7 @@ def test_profiles_stand_side_by_side_and_their_figure_and_numbers_are_written(ca
     Detect(file, names, out=figure, json=numbers).run()
     said = capsys.readouterr().out
     assert "paper and paper:detect.f_base_n=31: 0 contacts in both, 3 only in paper, 0 only in" in said
-    assert "paper:detect.f_base_n=31: no contact in 0.2 min" in said
+    assert "paper:detect.f_base_n=31: no contact in 0.2 min; an F_b above 29.6 N gives none" in said
     assert "time [s]" in said
     assert f"Figure: {figure}" in said
     assert f"Numbers: {numbers}" in said
@@ -128,13 +128,16 @@ def test_joint_torques_are_detected_on_by_pretouch_and_paper(capsys, pushed_arm,
     assert "arm.csv: 13000 samples in 26.0 s, 500 Hz" in said
     assert "assumed to be on the robot (otherwise --sign by-robot). The arm is assumed to be panda (--arm)." in said
     assert "pretouch: without a skin free motion is learnt" in said
-    assert "pretouch: 1 contact in 0.4 min, 1 of them in 0.4 min of motion; if nobody touched the arm" in said
+    assert "pretouch: 1 contact in 0.4 min; if nobody touched the arm, 144 false alarms an hour." in said
     assert f"Page: {page}" in said
     told = json.loads(numbers.read_text())
     assert [p["profile"] for p in told["profiles"]] == ["pretouch", "paper"]
     (contact,) = told["profiles"][0]["contacts"]
     assert 22.0 < contact["time_s"] < 22.1
-    assert contact["link"] == "panda_link5"
+    assert (contact["link"], contact["links"]) == ("panda_link5", ["panda_link5"])
+    look = contact["circumstances"]
+    assert f"pretouch {look['joint']}" in " ".join(said[said.index("\nAlarms\n") :].split())
+    assert len(look["doing"]) == len(look["residual_nm"]) == len(look["free_motion_nm"]) == 7
     assert contact["force_n"] == pytest.approx([0.0, 25.0, 0.0], abs=4.0)
     assert len(contact["point_m"]) == 3
     assert len(told["profiles"][0]["torques"]["residual_sigma_nm"]) == 7

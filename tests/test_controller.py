@@ -37,6 +37,13 @@ def test_the_arm_follows_its_path_at_the_speed_asked(arm: Arm):
     assert steps[-1].path_phase - steps[0].path_phase == pytest.approx(59 * 0.003, rel=0.02)
 
 
+def test_torques_alone_arm_the_sequential_test_where_there_is_no_force(panda_model: RobotModel, paper_skin: Skin):
+    arm = Arm(panda_model, paper_skin, PROFILES["pretouch"])
+    steps = [arm.step(change=lambda robot: replace(robot, wrench=None)) for _ in range(101)]
+    assert [step.armed for step in steps] == [False] * 100 + [True]
+    assert steps[-1].mode is Mode.TRACK
+
+
 def test_at_the_end_of_its_path_the_arm_stands(arm: Arm):
     steps = arm.run(600)
     np.testing.assert_allclose(arm.ee(), arm.controller.path.point(0.4), atol=2e-3)

@@ -143,7 +143,7 @@ class Decision:
         """Distinguish a contact from free motion (eqs. 8-11); return the detection and the detector's state."""
         p, memory, robot, state = self.profile, self.memory, self.robot, self.state
         reacting, before = self.mode.mode is Mode.REACT, memory.part("window", Window)
-        window = add_force(before, None if robot.wrench is None else robot.wrench[:3], p.window)
+        window = add_force(before, p.detect.counted(robot, before), p.window)
         doubted = self.load.doubted_kg if self.load else 0.0
         sample = Sample(
             self.stamp, self.kin, robot, window, before.full, self.near, reacting, self.watched, self.touches, doubted

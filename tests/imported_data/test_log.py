@@ -1,6 +1,7 @@
 """Samples in time, joints by their names, and what cannot be opened."""
 
 import os
+from copy import copy
 from pathlib import Path
 
 import numpy as np
@@ -112,6 +113,18 @@ def test_positions_out_of_the_arms_range_are_refused_and_degrees_are_named(panda
         check_reach(PLACE, np.degrees(q), panda_model)
     with pytest.raises(RecordingError, match=r"panda_joint2 .* is at -78\.54 rad, .*: check the unit and the arm"):
         check_reach(PLACE, 100 * q, panda_model)
+
+
+def test_one_endless_joint_may_count_many_turns_and_two_are_in_degrees(panda_model):
+    arm = copy(panda_model)
+    arm.q_min, arm.q_max = panda_model.q_min.copy(), panda_model.q_max.copy()
+    arm.q_min[[0, 6]], arm.q_max[[0, 6]] = -2 * np.pi, 2 * np.pi
+    q = np.tile(panda_model.description.q_ready, (3, 1))
+    q[:, 6] = [6.0, 9.0, 31.0]
+    check_reach(PLACE, q, arm)
+    q[:, 0] = -90.0
+    with pytest.raises(RecordingError, match=r"panda_joint1 .* is at -90 rad"):
+        check_reach(PLACE, q, arm)
 
 
 @pytest.mark.parametrize(

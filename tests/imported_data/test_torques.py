@@ -2,6 +2,7 @@
 
 import csv
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,15 +10,18 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
+from pretouch.contact.localisation import LocalisationState
 from pretouch.errors import ParameterError, RecordingError
-from pretouch.imported_data.detect import detect
+from pretouch.imported_data.detect import alike, detect
 from pretouch.imported_data.log import Choice
 from pretouch.imported_data.reading import open_log
+from pretouch.imported_data.results import joint_motion
 from pretouch.imported_data.tables import renamed
 from pretouch.imported_data.torques import observed, torque_recording
 from pretouch.profiles import profile
+from pretouch.types import Touched
 from tests.imported_data.files import write_csv
-from tests.imported_data.joint_files import Moving
+from tests.imported_data.joint_files import FRICTION, Moving
 
 PUSHES = ((22.0, 0.4, "panda_link5", (0.0, 25.0, 0.0)), (27.0, 0.4, "panda_hand", (20.0, 0.0, 0.0)))
 
@@ -53,8 +57,17 @@ def test_pushes_are_found_with_their_link_and_force_and_nothing_else(tmp_path, p
     for contact, (start, _, _, force) in zip(result.contacts, PUSHES, strict=True):
         assert start < contact.time_s < start + 0.1
         np.testing.assert_allclose(contact.force_n, force, atol=4.0)
-    assert result.contacts_in_motion == 2
-    assert result.contacts_per_hour_of_motion == pytest.approx(2 * 3600 / result.motion_s)
+        look, i = contact.circumstances, np.searchsorted(pushed.time, contact.time_s)
+        # the push is the residual, and friction, which was learnt, is free motion
+        assert np.abs(look.residual_nm - pushed.external[i]).max() < 0.6 * np.abs(pushed.external[i]).max()
+        speed = pushed.qd_d[i]
+        np.testing.assert_allclose(look.free_motion_nm, -FRICTION * np.tanh(speed / 0.1) - 0.3 * speed, atol=0.5)
+        np.testing.assert_allclose(look.speed_rad_s, speed, atol=0.02)
+        assert "at rest" not in look.doing
+        unusual = np.abs(look.residual_nm) / look.sigma_nm
+        assert look.joint == f"panda_joint{unusual.argmax() + 1}"
+    assert result.armed_s == pytest.approx(29.0, abs=0.2)
+    assert result.contacts_per_hour == pytest.approx(2 * 3600 / result.armed_s)
     assert (result.torques.residual_sigma_nm < result.torques.external_sigma_nm).all()
     assert result.torques.largest_evidence < 1.0
     assert "unwatched" in codes(result.notes)
@@ -85,10 +98,60 @@ def test_after_a_gap_what_was_learnt_is_kept_and_nothing_is_found_in_it(tmp_path
     assert [c.link for c in result.contacts] == ["panda_link5", "panda_hand"]
 
 
+def at_rest(recording, q, push):
+    """A recording of an arm at rest at positions q (n,), that is pushed with torques (n,) from 4 to 4.4 s."""
+    noise = np.random.default_rng(1).normal(0.0, 0.05, recording.q.shape)
+    pushed = ((recording.time >= 4.0) & (recording.time < 4.4))[:, None] * push
+    still = np.zeros_like(noise)
+    return replace(recording, q=still + q, qd=still, qd_commanded=still, tau_ext=noise + pushed)
+
+
+def test_near_a_singularity_torques_detect_and_a_force_says_that_it_is_deaf(tmp_path, short, panda_model):
+    recording = read_torques(short.external_csv(tmp_path / "a.csv"), Choice())
+    stretched = np.array([0.0, 0.0, -1.5, -0.1, 2.8, 0.16, 0.0])
+    deaf = at_rest(recording, stretched, np.array([4.0, 0, 8, 0, 0, 0, 0]))
+    result = found_in(deaf)
+    assert [4.0 < c.time_s < 4.1 for c in result.contacts] == [True]
+    assert result.armed_s == pytest.approx(5.0, abs=0.02)
+    assert "deaf" not in codes(result.notes)
+    # a contact at rest is not left out of the rate
+    assert result.contacts_per_hour == pytest.approx(720.0, rel=0.01)
+    with pytest.raises(RecordingError, match=r"has 0\.00 s of usable force, but the window of paper takes 1 s to fill"):
+        detect(deaf, profile("paper"))
+    turned = recording.time > 3.0
+    partly = replace(deaf, q=np.where(turned[:, None], stretched, panda_model.description.q_ready))
+    (note,) = [note for note in detect(partly, profile("paper"))[0].notes if note.code == "deaf"]
+    values = {name: note.values[name] for name in ("seconds", "of", "longest", "time")}
+    # 1 s while the window fills, and 3 s near the singularity
+    assert values == pytest.approx({"seconds": 4.0, "of": 6.0, "longest": 3.0, "time": 3.0}, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("speeds", "doing"),
+    [
+        ((0.0, 0.01, -0.02), "at rest"), ((-0.02, 0.01, 0.03), "setting out"), ((0.5, 0.1, 0.0), "stopping"),
+        ((0.2, 0.0, -0.1), "reversing"), ((-0.2, 0.0, -0.3), "cruising"),
+    ],
+)  # fmt: skip
+def test_what_a_joint_was_doing_is_told_by_its_speeds(speeds, doing):
+    assert joint_motion(np.array(speeds)) == doing
+
+
+def test_links_that_explain_the_torques_as_well_are_named_and_no_other(panda_model):
+    link = panda_model.surface.link
+    hand, fifth, sixth = (link == panda_model.link_index(f"panda_{name}") for name in ("hand", "link5", "link6"))
+    ln = np.where(hand, -2.4, np.where(sixth, -2.2, np.where(fifth, 0.0, -9.0)))
+    number = np.array([panda_model.link_index("panda_link5")])
+    none = Touched(number, np.zeros((1, 3)), np.zeros((1, 3)), np.ones(1), np.ones(1))
+    assert alike(LocalisationState(ln, 1.0, 3, 0.0, none), panda_model) == ("panda_link5", "panda_link6")
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
         ({"tau": -1.0}, "minus those that hold the arm: they have the other sign, so give --sign by-robot"),
+        ({"tau": [-1, -1, -1, 1, -1, -1, -1]}, "other sign than the model's at 'panda_joint1', 'panda_joint2', "),
+        ({"tau": [1, 1, 1, -1, 1, 1, 1]}, "other sign than the model's at 'panda_joint4', but not at 'panda_joint1', "),
         ({"tau": 1000.0}, "in mNm, name the columns tau1_mNm"),
         ({"q": 180 / np.pi}, "as degrees all are within: name the columns q1_deg"),
         ({"dq": 180 / np.pi}, "so they are in degrees: name the columns dq1_deg_s"),
@@ -101,6 +164,17 @@ def test_a_wrong_sign_or_unit_is_refused_and_named(tmp_path, short, change, word
         read_torques(file, Choice())
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_no_sign_is_taken_that_leaves_the_torques_unexplained(tmp_path, short):
+    """All but one are reversed: turned round all together, that one is wrong; of another arm, all are."""
+    most = short.raw_csv(tmp_path / "a.csv", tau=[-1, -1, -1, 1, -1, -1, -1])
+    with pytest.raises(RecordingError, match="at 'panda_joint4', but not at 'panda_joint1'"):
+        read_torques(most, Choice(sign="by-robot"))
+    other = short.raw_csv(tmp_path / "b.csv", tau=[0.1, -0.3, 0.2, 0.3, -1, 3, -1])
+    assert "unexplained" in codes(read_torques(other, Choice()).notes)
+    with pytest.raises(RecordingError, match="--sign by-robot the model of panda leaves"):
+        read_torques(other, Choice(sign="by-robot"))
 
 
 def external(short, file, tau):

@@ -1,5 +1,6 @@
 """`pretouch detect`: the detectors of some profiles on a recording of any arm, as tables, figure or page, and file."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -51,7 +52,7 @@ class Detect(Choice):
     """The arm: panda, fr3, or the folder of `pretouch robot import`; auto: by the names of its joints, otherwise a
     Panda."""
     gains: Numbers = field(default=(), kw_only=True)
-    """Torque by motor current of each joint, gear included [Nm/A], separated by commas: for current1_A."""
+    """Torque by motor current of each joint, gear and sign included [Nm/A], separated by commas: for current1_A."""
     rate: float = 0.0
     """Rate of the detector [Hz]; by default the profile's own, 100."""
     out: OptionalFile = None
@@ -60,9 +61,9 @@ class Detect(Choice):
 
     def run(self) -> None:
         """Run the detectors, show their results, and write figure, page and numbers if requested."""
-        if not all(np.isfinite(gain) and gain > 0.0 for gain in self.gains):
+        if not all(np.isfinite(gain) and gain for gain in self.gains):
             raise ParameterError(
-                f"--gains is {','.join(map('{:g}'.format, self.gains))}: give torques by current [Nm/A] above 0."
+                f"--gains is {','.join(map('{:g}'.format, self.gains))}: give torques by current [Nm/A], none of 0."
             )
         profiles = None if self.profiles in (AUTO, ()) else [self._profile(name) for name in self.profiles]
         if self.out and self.out.suffix not in ENDINGS:
@@ -125,6 +126,7 @@ class _Results:
         """Tables of contacts, of the detectors, and of free motion."""
         return [
             _contacts(self.results),
+            *_alarms(self.results, self.recording.model.joints),
             _detection(self.results),
             *_free_motion(self.results, self.recording.model.joints),
         ]
@@ -221,14 +223,37 @@ def _contacts(results: list[DetectorResult]) -> TextTable:
         place = np.full(3, np.nan) if c.point_m is None else c.point_m
         force = (*c.force_n, c.norm_n)
         numbers = (f"{c.time_s:.3f}", *(shown(x, 3) for x in place), *(shown(x, 1) for x in force))
-        rows.append((name, c.link or _NO, *numbers, c.axes or _NO))
+        link = (" or ".join(c.links) if len(c.links) < 3 else "cannot be told") or _NO
+        rows.append((name, link, *numbers, c.axes or _NO))
     header = ("profile", "link", "time [s]", *(f"{a} [m]" for a in "xyz"), "force x [N]", "y", "z", "norm", "axes")
     note = (
-        "Force on the robot, base frame. A detector on torques gives link, place and force of its strongest evidence."
+        "Force on the robot, base frame. A detector on torques gives link, place and force of its strongest evidence,"
+        " and all links that its torques could be of, or that they cannot be told."
         " A detector on thresholds gives the force at the end-effector less its mean (eq. 12), and the axes whose"
         " threshold the force crossed."
     )
     return TextTable("Contacts", header, tuple(rows) or (("none", *[""] * 10),), note, 1)
+
+
+def _alarms(results: list[DetectorResult], joints: Sequence[str]) -> list[TextTable]:
+    """Return a table of what each alarm by torques looked like, if there is one."""
+    rows = []
+    for r in results:
+        for c in r.contacts:
+            if look := c.circumstances:
+                j, others = joints.index(look.joint), Counter(look.doing)
+                numbers = (shown(x[j], 2) for x in (look.residual_nm, look.sigma_nm, look.free_motion_nm))
+                arm = ", ".join(f"{count} {word}" for word, count in others.most_common())
+                speeds = shown(look.speed_rad_s[j], 2), look.doing[j], shown(np.abs(look.speed_rad_s).max(), 2), arm
+                rows.append((r.profile, look.joint, f"{c.time_s:.3f}", shown(c.evidence or 0.0, 1), *numbers, *speeds))
+    header = "profile", "joint", "time [s]", "evidence", "residual [Nm]", "sigma", "free motion [Nm]", "speed [rad/s]"
+    header = (*header, "doing", "fastest", "all joints")
+    note = (
+        "The joint with the most unusual residual at the alarm, its deviation in free motion, what learnt free motion"
+        " explains there, and what joints do from 0.3 s before to 0.3 s after: many alarms of joints that set out or"
+        " reverse are friction. --json has all joints."
+    )
+    return [TextTable("Alarms", header, tuple(rows), note)] if rows else []
 
 
 def _detection(results: list[DetectorResult]) -> TextTable:
@@ -237,15 +262,14 @@ def _detection(results: list[DetectorResult]) -> TextTable:
         ("contacts", lambda r: str(len(r.contacts))),
         ("armed [s]", lambda r: shown(r.armed_s, 1)),
         ("free [s]", lambda r: shown(r.free_s, 1)),
-        ("in motion [s]", lambda r: shown(r.motion_s, 1)),
-        ("contacts per hour of motion", lambda r: shown(r.contacts_per_hour_of_motion, 1)),
+        ("contacts per hour", lambda r: shown(r.contacts_per_hour, 1)),
         ("evidence without contact", lambda r: shown(r.torques.largest_evidence, 2) if r.torques else _NO),
         ("detectable [N]", lambda r: shown(r.detectable_n, 1)),
     ]
     note = (
-        "Evidence of 1 or more is a contact. Detectable: force at the end-effector that the detector itself expects to"
-        " detect, in the direction in which the torques are least sensitive (median); for the paper's thresholds, their"
-        " distance from the mean."
+        "Per hour: all contacts by the armed time, at rest and in motion. Evidence of 1 or more is a contact."
+        " Detectable: force at the end-effector that the detector itself expects to detect, in the direction in which"
+        " the torques are least sensitive (median); for the paper's thresholds, their distance from the mean."
     )
     return tabulated("Detection", columns, results, note, 1)
 

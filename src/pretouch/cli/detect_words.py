@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.imported_data.log import Note
 from pretouch.imported_data.reading import ForceRecording
-from pretouch.imported_data.results import DetectorResult, ThresholdSummary
+from pretouch.imported_data.results import DetectorResult
 from pretouch.imported_data.torques import TorqueRecording
 from pretouch.recording.compare import paired
 
@@ -28,12 +28,14 @@ _SENTENCES = {
     " {correlation:.2f} at the worst joint: check them.",
     "derived_velocities": "Velocities are those of positions.",
     "no_commands": "There are no commanded velocities (dq_d1_rad_s ...): the measured ones, smoothed, stand in.",
+    "unexplained": "The model of {arm} leaves {share:.0%} of the torques unexplained, so results may be wrong: check"
+    " --arm, --payload, units and how the arm is mounted.",
     "slower": "The data come at {rate:.4g} Hz and the detector of {profile} runs at {own:.4g} Hz: repeated samples"
     " count several times, and lower sigma; --rate {rate:.4g} runs it at the data's own rate.",
-    "cycles_without": "{profile}: {count} of {of} cycles have no force, so nothing is detected in them.",
+    "deaf": "{profile} could detect nothing in {seconds:.1f} of {of:.1f} s, longest for {longest:.1f} s from"
+    " {time:.1f} s on: its window was filling, or it had no usable {what}, as near a singularity or after a gap.",
     "unwatched": "{profile}: without a skin free motion is learnt from everything that does not look like a contact"
     " (detect.learn=always), also from a touch at the start.",
-    "never_armed": "{profile} was never armed: the recording is shorter than its window, or too near a singularity.",
     "long": "{profile}: the contact at {time:.1f} s lasts {seconds:.0f} s; if nobody leant on the arm, its model or"
     " load is wrong (--arm, --payload, units), or more has to be allowed for (detect.friction_prior_nm,"
     " detect.offset_prior_nm, detect.torque_prior_nm).",
@@ -100,34 +102,16 @@ def guidance(results: Sequence[DetectorResult]) -> list[str]:
             f" {first.profile}, {len(r.contacts) - both} only in {r.profile}."
         )
     for r in results:
-        thresholds = r.thresholds if np.isnan(r.motion_s) else None
-        texts.append(f"{r.profile}: {_threshold_guidance(r, thresholds) if thresholds else _motion_guidance(r)}")
+        count, t, minutes = len(r.contacts), r.thresholds, r.armed_s / 60
+        text = f"{r.profile}: {count or 'no'} contact{'s' * (count > 1)} in {minutes:.1f} min"
+        if count:
+            text += f"; if nobody touched the arm, {r.contacts_per_hour:.3g} false alarms an hour"
+        if t is not None:
+            text += f"; an F_b above {t.f_base_all_n:.1f} N gives none (it is {t.f_base_n:g} N)"
+        if t is not None and count:
+            text += f", one above {t.f_base_free_n:.1f} N no other"
+        texts.append(f"{text}.")
     return texts
-
-
-def _threshold_guidance(r: DetectorResult, t: ThresholdSummary) -> str:
-    count, minutes = len(r.contacts), r.armed_s / 60
-    if not count:
-        return (
-            f"no contact in {minutes:.1f} min; an F_b below {t.f_base_all_n:.1f} N would have given one (F_b is"
-            f" {t.f_base_n:g} N)."
-        )
-    contacts, these = ("1 false contact", "this") if count == 1 else (f"{count} false contacts", "these")
-    return (
-        f"if nobody touched the arm, {contacts} in {minutes:.1f} min; an F_b above {t.f_base_all_n:.1f} N would have"
-        f" given none, one above {t.f_base_free_n:.1f} N none but {these} (it is {t.f_base_n:g} N)."
-    )
-
-
-def _motion_guidance(r: DetectorResult) -> str:
-    count = len(r.contacts)
-    contacts = f"{count or 'no'} contact{'' if count == 1 else 's'} in {r.armed_s / 60:.1f} min"
-    if not r.motion_s:
-        return f"{contacts}; the arm does not move."
-    return (
-        f"{contacts}, {r.contacts_in_motion} of them in {r.motion_s / 60:.1f} min of motion; if nobody touched the arm,"
-        f" these are {r.contacts_per_hour_of_motion:.3g} false alarms an hour."
-    )
 
 
 def shown(value: float, digits: int) -> str:

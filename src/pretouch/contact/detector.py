@@ -42,7 +42,7 @@ class Sample:
     robot: RobotState
     """State of the arm, with the estimates of external torques and force; NaN and None where there is none."""
     window: Window
-    """Force window with the force of this step in it (eq. 8)."""
+    """Force window with `Detector.counted` of this step in it (eq. 8)."""
     armed: bool
     """True if the window was full before this step: before that no contact counts."""
     obstacles: Obstacles
@@ -94,6 +94,16 @@ class Detector(Part, group="pretouch.detectors"):
     def reads_touch(self) -> bool:
         """True if it uses the units' touch readings."""
         return False
+
+    def counted(self, robot: RobotState, window: Window) -> FloatArray | None:
+        """Return the force (3,) [N] that fills the window, and so arms the detector; None in a step that does not.
+
+        Torques alone arm a detector that uses them: without a force, as near a singularity, the newest one is repeated.
+        """
+        force = None if robot.wrench is None else robot.wrench[:3]
+        if not self.by_torques:
+            return force
+        return (window.newest if force is None else force) if below(robot.tau_ext, np.inf) else None
 
     def init(self, body: Body, learnt: ResidualModel | None = None) -> Any:
         """Return the state before the first step.

@@ -2,12 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pretouch.composition import changed
 from pretouch.contact.detector import Body, Detection, Detector, Sample
+from pretouch.contact.localisation import LocalisationState
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.reaction import DecayingVelocity
 from pretouch.contact.window import Window, add_force, window_init
@@ -15,6 +17,7 @@ from pretouch.errors import RecordingError
 from pretouch.imported_data.log import Note
 from pretouch.imported_data.reading import ForceRecording
 from pretouch.imported_data.results import (
+    AROUND_S,
     NEAR_S,
     Course,
     DetectorResult,
@@ -22,20 +25,19 @@ from pretouch.imported_data.results import (
     TorqueCourse,
     TorqueSummary,
     free_cycles,
+    joint_motion,
     result_of,
 )
 from pretouch.imported_data.torques import GAP_S, TorqueRecording, pieces
 from pretouch.modes import Event, mode_init, next_mode
 from pretouch.params import SequentialParams
 from pretouch.profiles import Profile
-from pretouch.recording.compare import Decision, Decisions, DetectedContact, decisions_of
+from pretouch.recording.compare import Circumstances, Decision, Decisions, DetectedContact, decisions_of
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.observer import wrench_from_torques
 from pretouch.types import BoolArray, FloatArray, IntArray, Mode, RobotState, no_obstacles
 
-MOVING_RAD_S = 0.02
-"""Speed of any joint from which the arm moves [rad/s]."""
 _SLOWER = 0.95
 """Share of the detector's rate below which data count as slower."""
 _DAMPING, _SINGULAR = 0.01, 0.02
@@ -43,6 +45,8 @@ _DAMPING, _SINGULAR = 0.01, 0.02
 Jacobian at which it does."""
 _LONG_S = 15.0
 """Time from which on a contact is doubted [s]."""
+_ALIKE_NATS = np.log(10.0)
+"""Log-likelihood below the best link's up to which the torques could be of another link [1]."""
 _OF_CURRENTS = {"friction_prior_nm": 0.1, "offset_prior_nm": 0.03, "torque_prior_nm": 0.02}
 """Uncertainty of torques from currents, as shares of a joint's usual torque limit [1]; from the UR10e."""
 
@@ -79,16 +83,11 @@ def _by_force(r: ForceRecording, p: Profile) -> tuple[DetectorResult, Decisions]
     force = r.force[newest]
     usable = (ticks - r.time[newest] <= timeout) & (np.abs(force) < p.failure.force_max_n).all(axis=1)
     d = _decided(ticks, np.where(usable[:, None], force, np.nan), p)
-    if not d.armed.any():
-        raise RecordingError(
-            f"{r.place} has {usable.sum() * period:.2f} s of usable force, but the window of {p.name} takes"
-            f" {p.window.samples * period:g} s to fill: give a longer recording."
-        )
+    deaf = _deaf(r.place, "force", d, usable, p)
     free = free_cycles(d.judged & ~d.reacting, d)
     summary = _summary(d, free, MovingThresholds.of_kind(p.detect).f_base_n)
-    moving = None if r.moving is None else r.moving[newest]
-    notes = (*_slower(r.rate, p), *_without(r.time, d, p))
-    return result_of(p, d, free, moving, float(summary.width_n.max()), summary, notes), d
+    notes = (*_slower(r.rate, p), *_gaps(r.time, timeout), *deaf)
+    return result_of(p, d, free, float(summary.width_n.max()), summary, notes), d
 
 
 def cycles(time: FloatArray, period: float, gap_s: float, hold: bool) -> tuple[FloatArray, IntArray, BoolArray]:
@@ -157,16 +156,31 @@ def _slower(rate: float, profile: Profile) -> list[Note]:
     return [Note("slower", {"profile": profile.name, "rate": rate, "own": own})] if rate < _SLOWER * own else []
 
 
-def _without(time: FloatArray, d: Decisions, profile: Profile) -> list[Note]:
+def _gaps(time: FloatArray, longer_s: float) -> list[Note]:
     """Say what time is without a force."""
-    timeout, steps = profile.failure.force_timeout_s, np.diff(time)
-    gaps, without = steps[steps > timeout], int(np.count_nonzero(~np.isfinite(d.force).all(axis=1)))
-    notes = []
-    if len(gaps):
-        notes.append(Note("force_gaps", {"count": len(gaps), "longer_s": timeout, "seconds": float(gaps.sum())}))
-    if without:
-        notes.append(Note("cycles_without", {"profile": d.name, "count": without, "of": len(d.time)}))
-    return notes
+    gaps = (steps := np.diff(time))[steps > longer_s]
+    sizes = {"count": len(gaps), "longer_s": longer_s, "seconds": float(gaps.sum())}
+    return [Note("force_gaps", sizes)] if len(gaps) else []
+
+
+def _deaf(place: Path, what: str, course: Course, usable: BoolArray, profile: Profile) -> list[Note]:
+    """Say when nothing could be detected, but for the window's length; RecordingError if that was always.
+
+    `usable` (S,) are the cycles with what the detector needs.
+    """
+    period, deaf, fills = profile.task.control_period_s, ~course.judged, profile.window.samples
+    if deaf.all():
+        raise RecordingError(
+            f"{place} has {usable.sum() * period:.2f} s of usable {what}, but the window of {profile.name} takes"
+            f" {fills * period:g} s to fill: give a longer recording."
+        )
+    if deaf.sum() <= fills + 1:
+        return []
+    ends = np.flatnonzero(np.diff(deaf.astype(np.int64), prepend=0, append=0)).reshape(-1, 2)
+    begin, end = ends[np.argmax(np.diff(ends, axis=1))]
+    span = {"seconds": period * int(deaf.sum()), "of": period * len(deaf), "pieces": len(ends)}
+    longest = {"longest": period * int(end - begin), "time": float(course.time[begin])}
+    return [Note("deaf", span | longest | {"profile": profile.name, "what": what})]
 
 
 def _force_of(r: TorqueRecording, period: float) -> ForceRecording:
@@ -174,12 +188,7 @@ def _force_of(r: TorqueRecording, period: float) -> ForceRecording:
     time, newest, _ = cycles(r.time, period, GAP_S, hold=False)
     wrenches = [_wrench(r.model, r.q[i], r.tau_ext[i]) for i in newest]
     force = np.array([np.full(3, np.nan) if wrench is None else wrench[:3] for wrench in wrenches])
-    return ForceRecording(r.place, r.model, False, r.first_s, time, (), "", False, force, _moving(r, newest))
-
-
-def _moving(r: TorqueRecording, at: IntArray) -> BoolArray:
-    """Mask of the samples (S,) at which the arm moves."""
-    return np.abs(r.qd_commanded[at]).max(axis=1) > MOVING_RAD_S
+    return ForceRecording(r.place, r.model, False, r.first_s, time, (), "", False, force)
 
 
 def _wrench(model: RobotModel, q: FloatArray, tau: FloatArray) -> FloatArray | None:
@@ -194,11 +203,10 @@ def _by_torques(r: TorqueRecording, profile: Profile) -> tuple[DetectorResult, T
     time, newest, first = cycles(r.time, profile.task.control_period_s, GAP_S, hold=False)
     course = _judged(r, profile, time, newest, first)
     name, free = profile.name, free_cycles(course.judged, course)
+    notes += _deaf(r.place, "torques", course, np.isfinite(course.residual).all(axis=1), profile)
     if getattr(profile.detect, "learn", "") == "watched":
         notes.append(Note("unwatched", {"profile": name}))
     notes += _slower(r.rate, profile)
-    if not course.armed.any():
-        notes.append(Note("never_armed", {"profile": name}))
     lengths = [((c.end_s or c.time_s) - c.time_s, c.time_s) for c in course.contacts]
     if lengths and max(lengths)[0] > _LONG_S:
         notes.append(Note("long", dict(zip(("seconds", "time"), max(lengths), strict=True)) | {"profile": name}))
@@ -209,7 +217,7 @@ def _by_torques(r: TorqueRecording, profile: Profile) -> tuple[DetectorResult, T
         float(_over(free, np.max, course.evidence)),
     )
     detectable = float(_over(free, np.median, course.detectable_n))
-    return result_of(profile, course, free, _moving(r, newest), detectable, summary, tuple(notes)), course
+    return result_of(profile, course, free, detectable, summary, tuple(notes)), course
 
 
 def _for_currents(recording: TorqueRecording, profile: Profile) -> tuple[Profile, list[Note]]:
@@ -240,7 +248,7 @@ def _judged(r: TorqueRecording, profile: Profile, time: FloatArray, newest: IntA
         if state is None or (waiting and not without[cycle]):
             state, waiting = _begun(profile.detect, body, state, r.qd_commanded[i]), bool(without[cycle])
         detection, state = profile.detect.step(state, body, sample)
-        _follow(contacts, r.model, sample.stamp, detection)
+        _follow(contacts, sample.stamp, i, r, detection, state)
         detections.append(replace(detection, significant=None))
     names = ("residual", "evidence", "detectable_n", "armed")
     columns = {name: np.array([getattr(d, name) for d in detections]) for name in names}
@@ -251,7 +259,7 @@ def _sample(r: TorqueRecording, i: int, time: float, window: Window, profile: Pr
     """Return a cycle's sample, with the force window after it."""
     kin, wrench = r.model.kinematics(r.q[i]), _wrench(r.model, r.q[i], r.tau_ext[i])
     robot = RobotState(time, r.q[i], r.qd[i], r.q[i], r.qd_commanded[i], r.tau_ext[i], wrench)
-    after = add_force(window, None if wrench is None else wrench[:3], profile.window)
+    after = add_force(window, profile.detect.counted(robot, window), profile.window)
     # watched: whoever gives the recording stands in for the skin that would tell when free motion can be learnt
     return Sample(time, kin, robot, after, window.full, no_obstacles(), watched=True)
 
@@ -263,20 +271,46 @@ def _begun(detector: Detector, body: Body, before: Any, speed: FloatArray) -> An
     return detector.init(body, learnt and learnt._replace(speed=speed, filled=none, waiting=none))
 
 
-def _follow(contacts: list[DetectedContact], model: RobotModel, time: float, d: Detection) -> None:
-    """Begin a contact, or go on with the last one while there is evidence of it."""
+def _follow(contacts: list[DetectedContact], time: float, i: int, r: TorqueRecording, d: Detection, state: Any) -> None:
+    """Begin a contact at sample i, or go on with the last one while there is evidence of it."""
     last = contacts[-1] if contacts else None
     goes_on = last is not None and last.end_s is not None and time - last.end_s <= NEAR_S
     if d.contact is not None and not goes_on:
-        last, goes_on = DetectedContact(time, d.contact.force, end_s=time, evidence=-1.0), True
+        look = _circumstances(r, i, d)
+        last, goes_on = DetectedContact(time, d.contact.force, end_s=time, evidence=-1.0, circumstances=look), True
         contacts.append(last)
     if last is None or not goes_on or not d.armed or not d.evidence >= 1.0:
         return
     touched, best = d.touched, last.evidence or 0.0
     # the place gathers what all samples say: it is surest late, when the evidence may have passed its peak
     if len(touched.link) and touched.probability[0] > (last.probability or 0.0):
-        link, probability = model.links[touched.link[0]], float(touched.probability[0])
-        last = replace(last, link=link, point_m=touched.point[0], force_n=touched.force[0], probability=probability)
-    elif last.link is None and d.contact is not None and d.evidence > best:
+        inferred, sure = getattr(state, "localisation", None), float(touched.probability[0])
+        links = alike(inferred, r.model) if inferred else (r.model.links[touched.link[0]],)
+        place = {"links": links, "link": links[0] if len(links) == 1 else None, "point_m": touched.point[0]}
+        last = replace(last, force_n=touched.force[0], probability=sure, **place)
+    elif not last.links and d.contact is not None and d.evidence > best:
         last = replace(last, force_n=d.contact.force)
     contacts[-1] = replace(last, end_s=time, evidence=max(best, d.evidence))
+
+
+def alike(contact: LocalisationState, model: RobotModel) -> tuple[str, ...]:
+    """Return the links that the torques of a localised contact could be of, one a rigid body, the likeliest first.
+
+    Their likelihoods alone count: that a link is large is no evidence of a touch there.
+    """
+    link, own = model.surface.link, int(contact.touched.link[0])
+    best = {body: np.where(model.surface.body == body, contact.ln, -np.inf) for body in np.unique(model.surface.body)}
+    near = [int(link[ln.argmax()]) for ln in best.values() if ln.max() > contact.ln.max() - _ALIKE_NATS]
+    others = [other for other in near if model.rigid[other] != model.rigid[own]]
+    return tuple(model.links[which] for which in (own, *others))
+
+
+def _circumstances(r: TorqueRecording, i: int, d: Detection) -> Circumstances | None:
+    """Return what an alarm at sample i looked like; None from a detector that does not average."""
+    if d.significant is None:
+        return None
+    (residual, covariance), around = d.significant, np.abs(r.time - r.time[i]) <= AROUND_S
+    sigma = np.sqrt(np.diag(covariance))
+    doing = tuple(joint_motion(speeds) for speeds in r.qd_commanded[around].T)
+    joint = r.model.joints[int(np.argmax(np.abs(residual) / sigma))]
+    return Circumstances(joint, residual, sigma, r.tau_ext[i] - d.residual, r.qd_commanded[i], doing)

@@ -23,6 +23,8 @@ _LATE_S = 0.5
 """How far a stamp may lie before an earlier one [s]: messages overtake each other by less, two recordings by more."""
 _OUT_OF_RANGE_RAD = 0.5
 """Joint positions this far beyond the arm's range [rad] are of another unit or arm."""
+_TWO_TURNS_RAD = 12.5
+"""Range from which a joint may turn without end [rad]: `pretouch robot import` gives an endless one two turns."""
 _NUMBERED = re.compile(r"(.*?)(\d{1,2})(\D*)")
 
 
@@ -49,7 +51,7 @@ class Choice:
     columns: str = ""
     """Columns of other names, THEIRS=OURS separated by commas: tau_J_0=tau1_Nm; tau_J_*=tau*_Nm is all joints."""
     gains: tuple[float, ...] = ()
-    """Torque of each joint by its motor's current [Nm/A]."""
+    """Torque of each joint by its motor's current [Nm/A], negative where the motor counts the other way."""
     payload: float = 0.0
     """Load at the end-effector that the arm's model does not have [kg]: for measured torques."""
 
@@ -176,6 +178,10 @@ def check_reach(place: Path, q: FloatArray, model: RobotModel) -> None:
     """Refuse positions (N, n) [rad] that an arm cannot have: their unit or the arm is another one."""
     low, high = model.q_min - _OUT_OF_RANGE_RAD, model.q_max + _OUT_OF_RANGE_RAD
     beyond = (q < low) | (q > high)
+    # a joint with a range of two turns may have none, as the last one of a UR3: alone it may count more of them
+    endless = model.q_max - model.q_min > _TWO_TURNS_RAD
+    if np.count_nonzero(endless & beyond.any(axis=0)) < 2:
+        beyond &= ~endless
     if not beyond.any():
         return
     i, j = np.argwhere(beyond)[0]

@@ -10,7 +10,7 @@ from pretouch.errors import RecordingError
 from pretouch.imported_data.log import BAGS, PARQUET, TABLES, Choice, ImportedRecording, Log, Note, check_reach
 from pretouch.robot.model import RobotModel
 from pretouch.traces import JointTrace
-from pretouch.types import BoolArray, FloatArray
+from pretouch.types import FloatArray
 from pretouch.values import value
 
 if TYPE_CHECKING:
@@ -30,8 +30,6 @@ class ForceRecording(ImportedRecording):
     """True if it was taken to be in the end-effector's frame, and turned by the arm's posture."""
     force: FloatArray
     """(N, 3) on the robot by the environment [N], base frame, NaN where there is no estimate."""
-    moving: BoolArray | None = None
-    """(N,) whether a joint turns; None where that is not known."""
 
 
 def open_log(place: Path, choice: Choice) -> "Bag | Table":

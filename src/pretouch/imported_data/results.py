@@ -11,6 +11,9 @@ from pretouch.values import value
 NEAR_S = 0.5
 """Time about a contact that is no free motion, and without evidence of a contact after which it is over [s]."""
 
+AROUND_S, STILL_RAD_S = 0.3, 0.02
+"""Time about an alarm that tells what a joint was doing [s], and speed up to which it is at rest [rad/s]."""
+
 
 @value
 class ThresholdSummary:
@@ -57,10 +60,6 @@ class DetectorResult:
     """Time in which it could detect."""
     free_s: float
     """Part of it outside contacts and what is near them in time."""
-    motion_s: float
-    """Part of it in which the arm moved; NaN where its motion is not known."""
-    contacts_in_motion: int
-    """Contacts that began in motion."""
     detectable_n: float
     """Force at the end-effector that the detector itself says it finds: median in free motion, or median distance of a
     threshold from its mean along the worst axis; NaN if it does not say."""
@@ -69,9 +68,9 @@ class DetectorResult:
     notes: tuple[Note, ...]
 
     @property
-    def contacts_per_hour_of_motion(self) -> float:
-        """False alarms, if nobody touched the arm. NaN without motion."""
-        return 3600.0 * self.contacts_in_motion / self.motion_s if self.motion_s else np.nan
+    def contacts_per_hour(self) -> float:
+        """All contacts by all time in which one could be detected, at rest and in motion [1/h]."""
+        return 3600.0 * len(self.contacts) / self.armed_s
 
 
 @value
@@ -111,26 +110,34 @@ def free_cycles(ready: BoolArray, course: Course) -> BoolArray:
     return free
 
 
+def joint_motion(speeds: FloatArray) -> str:
+    """Return what a joint is doing by its velocities (S,) in a short time [rad/s], in a word or two."""
+    forwards, backwards = bool((speeds > STILL_RAD_S).any()), bool((speeds < -STILL_RAD_S).any())
+    if forwards and backwards:
+        return "reversing"
+    if not forwards and not backwards:
+        return "at rest"
+    if abs(speeds[0]) <= STILL_RAD_S:
+        return "setting out"
+    return "stopping" if abs(speeds[-1]) <= STILL_RAD_S else "cruising"
+
+
 def result_of(
     profile: Profile,
     course: Course,
     free: BoolArray,
-    moving: BoolArray | None,
     detectable: float,
     summary: ThresholdSummary | TorqueSummary,
     notes: tuple[Note, ...],
 ) -> DetectorResult:
-    """Sum up a course: (S,) which cycles are `free` motion, and in which the arm is `moving` if that is known."""
-    period, ready = profile.task.control_period_s, course.judged
-    begins = np.searchsorted(course.time, [c.time_s for c in course.contacts])
+    """Sum up a course; `free` (S,) are the cycles of free motion."""
+    period = profile.task.control_period_s
     return DetectorResult(
         profile=profile.name,
         control_rate_hz=1.0 / period,
         contacts=course.contacts,
-        armed_s=float(ready.sum() * period),
+        armed_s=float(course.judged.sum() * period),
         free_s=float(free.sum() * period),
-        motion_s=np.nan if moving is None else float((ready & moving).sum() * period),
-        contacts_in_motion=0 if moving is None else int(moving[begins].sum()),
         detectable_n=detectable,
         thresholds=summary if isinstance(summary, ThresholdSummary) else None,
         torques=summary if isinstance(summary, TorqueSummary) else None,

@@ -6,7 +6,7 @@ import numpy as np
 import scipy  # its parts load when they are first used: a quarter of a second that a help does not wait
 
 from pretouch.errors import RecordingError
-from pretouch.imported_data.log import TORQUES, Choice, ImportedRecording, Log, Note, check_reach
+from pretouch.imported_data.log import TORQUES, Choice, ImportedRecording, Log, Note, check_reach, listed
 from pretouch.params import SequentialParams
 from pretouch.robot.model import RobotModel
 from pretouch.sim.observer import observe, observer_init
@@ -20,6 +20,10 @@ _ALIKE, _UNLIKE = 0.9, 0.5
 """Correlation from which on, and below which, two velocities are taken to be the same, or not."""
 _FAR_BETTER = 0.25
 """Part of the squared error that another explanation may leave to be believed [1]."""
+_MOST = 0.5
+"""Part of the squared torques from which on they count as unexplained [1]."""
+_REVERSING_RAD_S = 0.1
+"""Speed over which friction changes its sign [rad/s]."""
 _SAMPLES = 400
 """How many samples are looked at."""
 _THOUSAND = (300.0, 3000.0)
@@ -68,8 +72,10 @@ def torque_recording(log: Log, choice: Choice) -> TorqueRecording:
     notes += _check_velocities(log.place, derived, qd) if "dq" in log.arrays else [Note("derived_velocities", {})]
     by_robot = choice.sign == "by-robot" or (choice.sign == "auto" and log.by_robot)
     torque = (-1.0 if by_robot else 1.0) * log.arrays[kind] * (np.array(choice.gains) if kind == "current" else 1.0)
-    _check_torques(log.place, q, qd, torque, model, kind != "tau_ext", choice.payload)
+    expected = _expected(model, time, q, qd, choice.payload)
+    _check_units(log.place, torque, expected, model, kind != "tau_ext")
     if kind != "tau_ext":
+        notes += _check_signs(log.place, qd, torque, expected, model, by_robot)
         torque = observed(model, time, q, qd, torque, SequentialParams().observer_gain_1_s, choice.payload)
     if "dq_d" not in log.arrays:
         notes.append(Note("no_commands", {}))
@@ -113,19 +119,26 @@ def _check_velocities(place: Path, true: FloatArray, qd: FloatArray) -> tuple[No
     return ()
 
 
-def _check_torques(
-    place: Path, q: FloatArray, qd: FloatArray, tau: FloatArray, model: RobotModel, measured: bool, payload: float
-) -> None:
-    """Hold torques (N, n) [Nm] against the model's: those that an arm measured, or else external ones.
+def _some(values: FloatArray) -> FloatArray:
+    """Return `_SAMPLES` of N samples, or all if there are fewer."""
+    return values[np.unique(np.linspace(0, len(values) - 1, _SAMPLES).astype(np.int64))]
 
-    RecordingError for what is of another sign or unit, and for external torques with gravity in them.
+
+def _expected(model: RobotModel, time: FloatArray, q: FloatArray, qd: FloatArray, payload: float) -> FloatArray:
+    """Torques (S, n) [Nm] that move an arm with a load [kg] as recorded, for some of the samples (N, n)."""
+    growth, torques = _some(velocities(time, smoothed(time, qd))), []
+    for p, v, a in zip(_some(q), _some(qd), growth, strict=True):
+        mass, bias, _ = _loaded(model, p, v, payload, None, 1.0)
+        torques.append(mass @ a + bias)
+    return np.array(torques)
+
+
+def _check_units(place: Path, tau: FloatArray, expected: FloatArray, model: RobotModel, measured: bool) -> None:
+    """Hold torques (N, n) [Nm], measured or else external ones, against those expected (S, n) [Nm].
+
+    RecordingError for another unit, and for external torques with gravity in them.
     """
-    some = np.unique(np.linspace(0, len(q) - 1, _SAMPLES).astype(np.int64))
-    q, qd, tau = q[some], qd[some], tau[some]
-    expected = np.zeros_like(q)
-    for i, (p, v) in enumerate(zip(q, qd, strict=True)):
-        load = payload * model.ee_jacobian(model.kinematics(p))[:3].T @ _GRAVITY
-        expected[i] = model.mass_matrix_and_bias(p, v, np.empty(model.n))[1] + load
+    tau = _some(tau)
     times = float(np.median(np.abs(tau).max(axis=1)) / max(np.median(np.abs(expected).max(axis=1)), 1e-9))
     largest = float(np.median((np.abs(tau) / model.description.tau_max).max(axis=1)))
     if largest > 2.0 and _THOUSAND[0] < (times if measured else 1000.0) < _THOUSAND[1]:
@@ -134,16 +147,49 @@ def _check_torques(
             " mNm, name the columns tau1_mNm or tau_ext1_mNm and so on."
         )
     same, other = (float(((tau - sign * expected) ** 2).sum()) for sign in (1.0, -1.0))
-    if measured and other < _FAR_BETTER * same:
-        raise RecordingError(
-            f"The torques in {place} are minus those that hold the arm: they have the other sign, so give --sign"
-            " by-robot (or on-robot, if you gave that)."
-        )
     if not measured and min(same, other) < _FAR_BETTER * float((tau**2).sum()):
         raise RecordingError(
             f"The external torques in {place} are {'' if same < other else 'minus '}those that hold the arm: gravity is"
             " still in them, so name the columns tau1_Nm and so on for our own observer."
         )
+
+
+def _check_signs(
+    place: Path, qd: FloatArray, tau: FloatArray, expected: FloatArray, model: RobotModel, by_robot: bool
+) -> list[Note]:
+    """Find the sign of each joint's measured torques (N, n) [Nm] with which model and friction explain them.
+
+    `expected` (S, n) are the model's, `by_robot` tells that all are turned round already. RecordingError for reversed
+    joints, and for torques turned round that stay unexplained; a note for others that do.
+    """
+    qd, tau, joints = _some(qd), _some(tau), np.arange(model.n)
+    turning = np.stack([np.tanh(qd / _REVERSING_RAD_S), qd], axis=2)
+    # friction never drives: its coefficients are at least 0, so that it tells the sign of a joint without gravity too
+    same, other = (
+        np.array([scipy.optimize.nnls(turning[:, j], s * tau[:, j] - expected[:, j])[1] ** 2 for j in joints])
+        for s in (1.0, -1.0)
+    )
+    whole = (tau**2).sum(axis=0)
+    wrong = (other < _FAR_BETTER * same) & (other < _MOST * whole)
+    right = (same < _FAR_BETTER * other) & (same < _MOST * whole)
+    rest, arm = float(np.where(wrong, other, same).sum() / max(whole.sum(), 1e-12)), model.description.name
+    if wrong.any() and rest < _MOST:
+        if not right.any():
+            raise RecordingError(
+                f"The torques in {place} are minus those that hold the arm: they have the other sign, so give --sign"
+                f" {'on' if by_robot else 'by'}-robot."
+            )
+        one, others = (listed([model.joints[j] for j in np.flatnonzero(which)]) for which in (wrong, right))
+        raise RecordingError(
+            f"The torques in {place} have the other sign than the model's at {one}, but not at {others}: turn the first"
+            " round, currents by a minus in --gains."
+        )
+    if by_robot and rest >= _MOST:
+        raise RecordingError(
+            f"With --sign by-robot the model of {arm} leaves {rest:.0%} of the torques in {place} unexplained: leave it"
+            " out, and check --arm, --payload and how the arm is mounted."
+        )
+    return [Note("unexplained", {"share": rest, "arm": arm})] if rest >= _MOST else []
 
 
 def _gaps(place: Path, time: FloatArray) -> list[Note]:

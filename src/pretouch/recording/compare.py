@@ -26,6 +26,24 @@ whether the force window was full, whether a reaction was under way, and the con
 
 
 @value
+class Circumstances:
+    """What an alarm by joint torques looked like, n joints."""
+
+    joint: str
+    """The joint whose residual is largest beside its deviation."""
+    residual_nm: FloatArray
+    """(n,) torques less those of learnt free motion, averaged over the time in which they are most significant [Nm]."""
+    sigma_nm: FloatArray
+    """(n,) standard deviation of that in free motion [Nm]."""
+    free_motion_nm: FloatArray
+    """(n,) torques of learnt free motion at the alarm [Nm]."""
+    speed_rad_s: FloatArray
+    """(n,) commanded velocities [rad/s]."""
+    doing: tuple[str, ...]
+    """What each joint was doing, see `joint_motion`."""
+
+
+@value
 class DetectedContact:
     """A contact that a detector reported."""
 
@@ -36,15 +54,19 @@ class DetectedContact:
     axes: str = ""
     """Axes whose threshold was crossed, as "xz"."""
     link: str | None = None
-    """The link that is touched; None where the profile does not say."""
+    """The link that is touched; None where the profile does not say or the torques cannot tell."""
+    links: tuple[str, ...] = ()
+    """All links that the torques could be of, one a rigid body, the likeliest first."""
     point_m: FloatArray | None = None
-    """(3,) where on its surface, base frame; None likewise."""
+    """(3,) where on the likeliest link's surface, base frame; None where the profile does not say."""
     end_s: float | None = None
     """Time of the last evidence of it; None where there is no evidence but the contact itself."""
     probability: float | None = None
-    """That it is this link's rigid body."""
+    """That it is the likeliest link's rigid body, if a touch is as likely on all of the arm's surface."""
     evidence: float | None = None
     """Largest of the contact."""
+    circumstances: Circumstances | None = None
+    """Of the alarm; None without joint torques."""
 
     @property
     def norm_n(self) -> float:
