@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.image import imread
 
 from pretouch.cli.detect import Detect
 from pretouch.errors import ParameterError, PretouchError, RecordingError
@@ -32,7 +31,6 @@ def test_what_was_read_assumed_and_found_is_printed_and_on_a_page(capsys, file, 
         "assumed to be the force on the robot (otherwise --sign by-robot) in the base frame (otherwise --frame ee)"
         in said
     )
-    assert "Without a skin no obstacle is known" in said
     rows = [line.split() for line in said.splitlines() if line.startswith("paper ")]
     assert [row[-1] for row in rows[:3]] == ["y", "x", "z"]
     assert "paper: 3 contacts in 0.2 min; if nobody touched the arm, 831 false alarms an hour; an F_b above" in said
@@ -52,16 +50,13 @@ def test_of_a_recording_of_units_it_is_said_what_can_be_done_with_it(tmp_path):
     assert len(str(caught.value)) < 300
 
 
-def test_profiles_stand_side_by_side_and_their_figure_and_numbers_are_written(capsys, file, tmp_path):
-    figure, numbers, names = tmp_path / "new" / "a.png", tmp_path / "a.json", ("paper", "paper:detect.f_base_n=31")
-    Detect(file, names, out=figure, json=numbers).run()
+def test_profiles_stand_side_by_side_and_their_numbers_are_written(capsys, file, tmp_path):
+    numbers, names = tmp_path / "new" / "a.json", ("paper", "paper:detect.f_base_n=31")
+    Detect(file, names, json=numbers).run()
     said = capsys.readouterr().out
-    assert "paper and paper:detect.f_base_n=31: 0 contacts in both, 3 only in paper, 0 only in" in said
     assert "paper:detect.f_base_n=31: no contact in 0.2 min; an F_b above 29.6 N gives none" in said
     assert "time [s]" in said
-    assert f"Figure: {figure}" in said
     assert f"Numbers: {numbers}" in said
-    assert imread(figure).std() > 0.05
     told = json.loads(numbers.read_text())
     assert [p["profile"] for p in told["profiles"]] == list(names)
     assert [c["axes"] for c in told["profiles"][0]["contacts"]] == ["y", "x", "z"]
@@ -88,8 +83,7 @@ def test_a_rate_is_that_of_the_detector(capsys, tmp_path):
         ({"gains": (1.0, 0.0)}, ParameterError, "--gains is 1,0"),
         ({"gains": (1.0, math.inf)}, ParameterError, "--gains is 1,inf"),
         ({"rate": 10.0}, ParameterError, "The rate is 10 Hz"),
-        ({"out": Path("a.gif")}, RecordingError, "a.gif has an unknown format"),
-        ({"out": Path("/dev/null/a.png")}, PretouchError, "/dev/null/a.png cannot be written"),
+        ({"out": Path("/dev/null/a.html")}, PretouchError, "/dev/null/a.html cannot be written"),
     ],
 )
 def test_bad_input_is_one_sentence_and_nothing_is_printed(capsys, file, given, error, words):
@@ -106,7 +100,6 @@ def test_a_recording_of_ours_gives_the_contacts_and_thresholds_it_holds(capsys, 
         for cycle in cycles:
             recording.record(cycle)
     Detect(place, profiles=("paper",), json=numbers).run()
-    assert "Without a skin no obstacle is known" in capsys.readouterr().out
     (paper,) = json.loads(numbers.read_text())["profiles"]
     contacts = [cycle.step for cycle in cycles if cycle.step.contact is not None]
     assert len(contacts) == 1
@@ -122,7 +115,7 @@ def pushed_arm(tmp_path_factory, panda_model):
 
 @pytest.mark.slow
 def test_joint_torques_are_detected_on_by_pretouch_and_paper(capsys, pushed_arm, tmp_path):
-    numbers, page, figure = tmp_path / "a.json", tmp_path / "a.html", tmp_path / "a.png"
+    numbers, page = tmp_path / "a.json", tmp_path / "a.html"
     Detect(pushed_arm[0], json=numbers, out=page).run()
     said = capsys.readouterr().out
     assert "arm.csv: 13000 samples in 26.0 s, 500 Hz" in said
@@ -140,15 +133,13 @@ def test_joint_torques_are_detected_on_by_pretouch_and_paper(capsys, pushed_arm,
     assert len(look["doing"]) == len(look["residual_nm"]) == len(look["free_motion_nm"]) == 7
     assert contact["force_n"] == pytest.approx([0.0, 25.0, 0.0], abs=4.0)
     assert len(contact["point_m"]) == 3
-    assert len(told["profiles"][0]["torques"]["residual_sigma_nm"]) == 7
+    assert told["profiles"][0]["largest_evidence"] < 1.0
     assert 1.0 < told["profiles"][0]["detectable_n"] < 20.0
     assert all(c["link"] is None and c["point_m"] is None for c in told["profiles"][1]["contacts"])
     text = page.read_text()
     assert text.count("<img src=") == 2
     assert "panda_link5" in text
     assert 'src="http' not in text
-    Detect(pushed_arm[0], profiles=("pretouch",), out=figure).run()
-    assert imread(figure).std() > 0.05
 
 
 @pytest.mark.slow
@@ -165,10 +156,7 @@ def test_with_a_force_beside_torques_each_can_be_had(capsys, pushed_arm, tmp_pat
         in capsys.readouterr().out
     )
     del columns["q7_rad"]
-    Detect(write_csv(tmp_path / "six.csv", columns)).run()
-    said = capsys.readouterr().out
-    assert "Joint torques are not used: " in said
-    assert "Force from force_x_N, assumed" in said
+    write_csv(tmp_path / "six.csv", columns)
     with pytest.raises(RecordingError, match="are not the 7 joints of panda"):
         Detect(tmp_path / "six.csv", profiles=("pretouch",)).run()
     with pytest.raises(RecordingError, match="gives only a force: choose one with"):

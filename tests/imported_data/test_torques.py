@@ -68,8 +68,7 @@ def test_pushes_are_found_with_their_link_and_force_and_nothing_else(tmp_path, p
         assert look.joint == f"panda_joint{unusual.argmax() + 1}"
     assert result.armed_s == pytest.approx(29.0, abs=0.2)
     assert result.contacts_per_hour == pytest.approx(2 * 3600 / result.armed_s)
-    assert (result.torques.residual_sigma_nm < result.torques.external_sigma_nm).all()
-    assert result.torques.largest_evidence < 1.0
+    assert result.largest_evidence < 1.0
     assert "unwatched" in codes(result.notes)
 
 
@@ -116,7 +115,7 @@ def test_near_a_singularity_torques_detect_and_a_force_says_that_it_is_deaf(tmp_
     assert "deaf" not in codes(result.notes)
     # a contact at rest is not left out of the rate
     assert result.contacts_per_hour == pytest.approx(720.0, rel=0.01)
-    with pytest.raises(RecordingError, match=r"has 0\.00 s of usable force, but the window of paper takes 1 s to fill"):
+    with pytest.raises(RecordingError, match=r"not the 1 s of usable force that fill the window of paper"):
         detect(deaf, profile("paper"))
     turned = recording.time > 3.0
     partly = replace(deaf, q=np.where(turned[:, None], stretched, panda_model.description.q_ready))
@@ -149,9 +148,9 @@ def test_links_that_explain_the_torques_as_well_are_named_and_no_other(panda_mod
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"tau": -1.0}, "minus those that hold the arm: they have the other sign, so give --sign by-robot"),
-        ({"tau": [-1, -1, -1, 1, -1, -1, -1]}, "other sign than the model's at 'panda_joint1', 'panda_joint2', "),
-        ({"tau": [1, 1, 1, -1, 1, 1, 1]}, "other sign than the model's at 'panda_joint4', but not at 'panda_joint1', "),
+        ({"tau": -1.0}, "minus those that move the arm at 'panda_joint1', "),
+        ({"tau": [-1, -1, -1, 1, -1, -1, -1]}, "arm at 'panda_joint1', 'panda_joint2', 'panda_joint3', 'panda_joint5'"),
+        ({"tau": [1, 1, 1, -1, 1, 1, 1]}, "those that move the arm at 'panda_joint4', but not at 'panda_joint1', "),
         ({"tau": 1000.0}, "in mNm, name the columns tau1_mNm"),
         ({"q": 180 / np.pi}, "as degrees all are within: name the columns q1_deg"),
         ({"dq": 180 / np.pi}, "so they are in degrees: name the columns dq1_deg_s"),

@@ -1,9 +1,8 @@
-"""`pretouch detect`: the detectors of some profiles on a recording of any arm, as tables, figure or page, and file."""
+"""`pretouch detect`: the detectors of some profiles on a recording of any arm, as tables, page and file."""
 
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +15,6 @@ from pretouch.cli.detect_words import guidance, read_from, sentences, shown
 from pretouch.cli.options import JsonFile, Numbers, OptionalFile, Words
 from pretouch.cli.tables import show
 from pretouch.cli.writing import check_writable, numbers_to, unwritable_said
-from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.errors import ParameterError, RecordingError
 from pretouch.extras import FIGURES
 from pretouch.imported_data.detect import detect
@@ -32,10 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 AUTO = ("auto",)
-ENDINGS = (".png", ".pdf", ".svg", ".html")
-_DOTS_PER_INCH = 150
 _NO = "–"
-_OF_TORQUES = ("joint", "external torque, sigma", "residual, mean", "residual, sigma")
 
 
 @dataclass(frozen=True)
@@ -56,59 +51,43 @@ class Detect(Choice):
     rate: float = 0.0
     """Rate of the detector [Hz]; by default the profile's own, 100."""
     out: OptionalFile = None
-    """Figure to write, ending in .png, .pdf or .svg, or page, ending in .html."""
+    """Page with figures to write, an .html file."""
     json: JsonFile = None
 
     def run(self) -> None:
-        """Run the detectors, show their results, and write figure, page and numbers if requested."""
+        """Run the detectors, show their results, and write page and numbers if requested."""
         if not all(np.isfinite(gain) and gain for gain in self.gains):
             raise ParameterError(
                 f"--gains is {','.join(map('{:g}'.format, self.gains))}: give torques by current [Nm/A], none of 0."
             )
         profiles = None if self.profiles in (AUTO, ()) else [self._profile(name) for name in self.profiles]
-        if self.out and self.out.suffix not in ENDINGS:
-            raise RecordingError(
-                f"The figure {self.out} has an unknown format: use one of the endings {', '.join(ENDINGS)}."
-            )
         if self.out:
-            FIGURES.need("A figure")
-            check_writable("figure", self.out)
+            FIGURES.need("A page with figures")
+            check_writable("page", self.out)
         with numbers_to(self.json) as write:
-            recording, notes = self._read(profiles)
+            file = open_log(self.file, self)
+            by_torques = _by_torques(file.kinds, self, profiles)
+            recording = torque_recording(file.torques(), self) if by_torques else read_force(file, self)
             names = ("pretouch", "paper") if isinstance(recording, TorqueRecording) else ("paper",)
-            answer = _answer(recording, profiles or [self._profile(name) for name in names], notes)
+            answer = _answer(recording, profiles or [self._profile(name) for name in names])
             write(answer.numbers())
             answer.show()
             if self.out:
                 answer.draw(self.out)
-                print(f"{'Page' if self.out.suffix == '.html' else 'Figure'}: {self.out}")
+                print(f"Page: {self.out}")
 
     def _profile(self, name: str) -> Profile:
         return at_rate(find_profile(name), self.rate) if self.rate else find_profile(name)
 
-    def _read(self, profiles: Sequence[Profile] | None) -> tuple[ForceRecording | TorqueRecording, list[str]]:
-        """Return the torques or the force to detect on, and sentences on what is not used."""
-        file, unused = open_log(self.file, self), list[str]()
-        if _by_torques(file.kinds, self, profiles):
-            try:
-                return torque_recording(file.torques(), self), unused
-            except RecordingError as error:
-                if profiles is not None or "force" not in file.kinds:
-                    raise
-                unused.append(f"Joint torques are not used: {error}")
-        return read_force(file, self), unused
-
 
 def _by_torques(kinds: frozenset[str], choice: Choice, profiles: Sequence[Profile] | None) -> bool:
     """Return True if detectors run on joint torques: where a log has their kind and not only thresholds are wanted."""
-    if choice.frame == "ee":
-        return False
     if choice.torques or choice.gains or choice.payload:
-        return True
-    force, torques = "force" in kinds, bool(kinds.intersection(TORQUES))
-    if choice.wrench or (force and profiles is not None and not any(p.detect.by_torques for p in profiles)):
+        return choice.frame != "ee"
+    by_force = profiles is not None and not any(p.detect.by_torques for p in profiles)
+    if choice.frame == "ee" or choice.wrench or (by_force and "force" in kinds):
         return False
-    return torques or ("q" in kinds and not force)
+    return bool(kinds.intersection(TORQUES)) or ("q" in kinds and "force" not in kinds)
 
 
 @dataclass(frozen=True)
@@ -128,7 +107,7 @@ class _Results:
             _contacts(self.results),
             *_alarms(self.results, self.recording.model.joints),
             _detection(self.results),
-            *_free_motion(self.results, self.recording.model.joints),
+            *_free_motion(self.results),
         ]
 
     def numbers(self) -> dict[str, Any]:
@@ -160,20 +139,13 @@ class _Results:
             console.print(sentence, markup=False)
 
     def draw(self, out: Path) -> None:
-        """Write the first of the figures, or with the ending .html a page of all with sentences and tables."""
-        figures = self._figures()
-        if out.suffix == ".html":
-            from pretouch.reporting.page import detection_page  # needs the extra
+        """Write a page of sentences, tables and figures."""
+        from pretouch.reporting.page import detection_page  # needs the extra
 
-            text = [*guidance(self.results), read_from(self.recording), *self.notes]
-            page = detection_page(self.recording.place.name, text, self.tables, figures)
-            with unwritable_said("page", out):
-                atomic_write(out, page)
-            return
-        image = BytesIO()
-        figures[0][0].savefig(image, format=out.suffix[1:], dpi=_DOTS_PER_INCH)
-        with unwritable_said("figure", out):
-            out.write_bytes(image.getvalue())
+        text = [*guidance(self.results), read_from(self.recording), *self.notes]
+        page = detection_page(self.recording.place.name, text, self.tables, self._figures())
+        with unwritable_said("page", out):
+            atomic_write(out, page)
 
     def _figures(self) -> list[tuple["Figure", str]]:
         """Draw figures, each with its caption."""
@@ -192,9 +164,9 @@ class _Results:
         return figures
 
 
-def _answer(recording: ForceRecording | TorqueRecording, profiles: Sequence[Profile], unused: list[str]) -> _Results:
+def _answer(recording: ForceRecording | TorqueRecording, profiles: Sequence[Profile]) -> _Results:
     """Run profiles over a recording. One that cannot run is a note, if another can."""
-    results, courses, notes = list[DetectorResult](), list[Course](), [*unused, *sentences(recording.notes)]
+    results, courses, notes = list[DetectorResult](), list[Course](), sentences(recording.notes)
     failures: list[RecordingError] = []
     for profile in profiles:
         try:
@@ -208,11 +180,6 @@ def _answer(recording: ForceRecording | TorqueRecording, profiles: Sequence[Prof
             notes += [text for text in sentences(result.notes) if text not in notes]
     if not results:
         raise failures[0]
-    if any(
-        p.perception is not None and not p.detect.by_torques and MovingThresholds.of_kind(p.detect).f_d_n
-        for p in profiles
-    ):
-        notes.append("Without a skin no obstacle is known, so eq. 11 lowers no threshold.")
     return _Results(recording, results, courses, notes)
 
 
@@ -238,22 +205,18 @@ def _contacts(results: list[DetectorResult]) -> TextTable:
 def _alarms(results: list[DetectorResult], joints: Sequence[str]) -> list[TextTable]:
     """Return a table of what each alarm by torques looked like, if there is one."""
     rows = []
-    for r in results:
-        for c in r.contacts:
-            if look := c.circumstances:
-                j, others = joints.index(look.joint), Counter(look.doing)
-                numbers = (shown(x[j], 2) for x in (look.residual_nm, look.sigma_nm, look.free_motion_nm))
-                arm = ", ".join(f"{count} {word}" for word, count in others.most_common())
-                speeds = shown(look.speed_rad_s[j], 2), look.doing[j], shown(np.abs(look.speed_rad_s).max(), 2), arm
-                rows.append((r.profile, look.joint, f"{c.time_s:.3f}", shown(c.evidence or 0.0, 1), *numbers, *speeds))
-    header = "profile", "joint", "time [s]", "evidence", "residual [Nm]", "sigma", "free motion [Nm]", "speed [rad/s]"
-    header = (*header, "doing", "fastest", "all joints")
+    for name, time, look in ((r.profile, c.time_s, c.circumstances) for r in results for c in r.contacts):
+        if look:
+            j, speeds = joints.index(look.joint), np.abs(look.speed_rad_s)
+            numbers = look.residual_nm[j], look.sigma_nm[j], look.free_motion_nm[j], speeds[j], speeds.max()
+            arm = ", ".join(f"{count} {word}" for word, count in Counter(look.doing).most_common())
+            rows.append((name, look.joint, f"{time:.3f}", *(shown(x, 2) for x in numbers), look.doing[j], arm))
+    header = "profile", "joint", "time [s]", "residual [Nm]", "sigma", "free motion [Nm]", "speed [rad/s]", "fastest"
     note = (
         "The joint with the most unusual residual at the alarm, its deviation in free motion, what learnt free motion"
-        " explains there, and what joints do from 0.3 s before to 0.3 s after: many alarms of joints that set out or"
-        " reverse are friction. --json has all joints."
+        " explains there, and what joints do within 0.3 s: alarms of joints that set out or reverse may be friction."
     )
-    return [TextTable("Alarms", header, tuple(rows), note)] if rows else []
+    return [TextTable("Alarms", (*header, "joint is", "all joints"), tuple(rows), note)] if rows else []
 
 
 def _detection(results: list[DetectorResult]) -> TextTable:
@@ -263,7 +226,7 @@ def _detection(results: list[DetectorResult]) -> TextTable:
         ("armed [s]", lambda r: shown(r.armed_s, 1)),
         ("free [s]", lambda r: shown(r.free_s, 1)),
         ("contacts per hour", lambda r: shown(r.contacts_per_hour, 1)),
-        ("evidence without contact", lambda r: shown(r.torques.largest_evidence, 2) if r.torques else _NO),
+        ("evidence without contact", lambda r: shown(r.largest_evidence, 2)),
         ("detectable [N]", lambda r: shown(r.detectable_n, 1)),
     ]
     note = (
@@ -274,19 +237,12 @@ def _detection(results: list[DetectorResult]) -> TextTable:
     return tabulated("Detection", columns, results, note, 1)
 
 
-def _free_motion(results: list[DetectorResult], joints: Sequence[str]) -> list[TextTable]:
-    """One table of the forces in free motion, and one of the torques for each profile that goes by them."""
-    forces, tables = [], []
+def _free_motion(results: list[DetectorResult]) -> list[TextTable]:
+    """Return a table of the forces in free motion, if a profile goes by them."""
+    rows = []
     for r in results:
         if t := r.thresholds:
-            for axis, *values in zip("xyz", t.mean_n, t.sigma_n, t.window_sigma_n, t.width_n, strict=True):
-                forces.append((r.profile if axis == "x" else "", axis, *(shown(value, 2) for value in values)))
-        if s := r.torques:
-            columns = s.external_sigma_nm, s.residual_mean_nm, s.residual_sigma_nm
-            rows = zip(joints, *([shown(x, 3) for x in column] for column in columns), strict=True)
-            note = "Outside contacts; the residual is what learnt free motion does not explain."
-            tables.append(TextTable(f"Torques in free motion [Nm], {r.profile}", _OF_TORQUES, tuple(rows), note, 1))
-    if forces:
-        header = ("profile", "along", "mean", "sigma", "sigma in window", "thresholds at +-")
-        tables.append(TextTable("Free motion [N]", header, tuple(forces), "Outside contacts and reactions."))
-    return tables
+            for axis, *values in zip("xyz", t.mean_n, t.sigma_n, t.width_n, strict=True):
+                rows.append((r.profile if axis == "x" else "", axis, *(shown(value, 2) for value in values)))
+    header, note = ("profile", "along", "mean", "sigma", "thresholds at +-"), "Outside contacts and reactions."
+    return [TextTable("Free motion [N]", header, tuple(rows), note)] if rows else []

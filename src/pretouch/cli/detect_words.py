@@ -8,7 +8,6 @@ from pretouch.imported_data.log import Note
 from pretouch.imported_data.reading import ForceRecording
 from pretouch.imported_data.results import DetectorResult
 from pretouch.imported_data.torques import TorqueRecording
-from pretouch.recording.compare import paired
 
 _SENTENCES = {
     "no_time": "{rows} {have} no time and {were} left out.",
@@ -21,8 +20,7 @@ _SENTENCES = {
     "zeros_missing": "Force: {samples} all zeros and count as no estimate (--zeros kept).",
     "zeros_kept": "Force: {samples} all zeros, which on a Franka arm means no estimate (--zeros missing).",
     "looks_ee": "The force's frame_id is {frame!r}: if that is the end-effector's, add --frame ee.",
-    "force_gaps": "{gaps} of more than {longer_s:g} s, {seconds:.2f} s in all, without force.",
-    "gaps": "{gaps} of more than {longer_s:g} s, {seconds:.2f} s in all: what comes after begins anew.",
+    "gaps": "{gaps} of more than {longer_s:g} s, {seconds:.2f} s in all: torques begin anew after it.",
     "no_motion": "No joint moves: sign and unit of the velocities cannot be checked.",
     "velocities": "The velocities are {ratio:.2g} times those of the positions, with a correlation of"
     " {correlation:.2f} at the worst joint: check them.",
@@ -91,16 +89,8 @@ def read_from(r: ForceRecording | TorqueRecording) -> str:
 
 
 def guidance(results: Sequence[DetectorResult]) -> list[str]:
-    """Return sentences on shared contacts, and on the false alarms of an arm that nobody touched."""
-    first, *others = results
+    """Return a sentence on each detector's false alarms on an arm that nobody touched."""
     texts = []
-    for r in others:
-        pairs = paired(first.contacts, r.contacts)
-        both = sum(a is not None and b is not None for a, b in pairs)
-        texts.append(
-            f"{first.profile} and {r.profile}: {both} contacts in both, {len(first.contacts) - both} only in"
-            f" {first.profile}, {len(r.contacts) - both} only in {r.profile}."
-        )
     for r in results:
         count, t, minutes = len(r.contacts), r.thresholds, r.armed_s / 60
         text = f"{r.profile}: {count or 'no'} contact{'s' * (count > 1)} in {minutes:.1f} min"
@@ -108,8 +98,6 @@ def guidance(results: Sequence[DetectorResult]) -> list[str]:
             text += f"; if nobody touched the arm, {r.contacts_per_hour:.3g} false alarms an hour"
         if t is not None:
             text += f"; an F_b above {t.f_base_all_n:.1f} N gives none (it is {t.f_base_n:g} N)"
-        if t is not None and count:
-            text += f", one above {t.f_base_free_n:.1f} N no other"
         texts.append(f"{text}.")
     return texts
 

@@ -96,14 +96,13 @@ class Detector(Part, group="pretouch.detectors"):
         return False
 
     def counted(self, robot: RobotState, window: Window) -> FloatArray | None:
-        """Return the force (3,) [N] that fills the window, and so arms the detector; None in a step that does not.
+        """Return the force (3,) [N] that fills the window and so arms the detector; None in a step that does not.
 
-        Torques alone arm a detector that uses them: without a force, as near a singularity, the newest one is repeated.
+        Torques alone arm a detector that uses them: without a force, as near a singularity, the newest is repeated.
         """
-        force = None if robot.wrench is None else robot.wrench[:3]
-        if not self.by_torques:
-            return force
-        return (window.newest if force is None else force) if below(robot.tau_ext, np.inf) else None
+        if robot.wrench is None:
+            return window.newest if self.by_torques and below(robot.tau_ext, np.inf) else None
+        return robot.wrench[:3]
 
     def init(self, body: Body, learnt: ResidualModel | None = None) -> Any:
         """Return the state before the first step.

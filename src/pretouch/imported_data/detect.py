@@ -1,6 +1,5 @@
 """Detectors on a recorded force or recorded joint torques, cycle by cycle as in the controller, without a skin."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,12 +22,12 @@ from pretouch.imported_data.results import (
     DetectorResult,
     ThresholdSummary,
     TorqueCourse,
-    TorqueSummary,
     free_cycles,
     joint_motion,
+    over,
     result_of,
 )
-from pretouch.imported_data.torques import GAP_S, TorqueRecording, pieces
+from pretouch.imported_data.torques import GAP_S, TorqueRecording, gaps, pieces
 from pretouch.modes import Event, mode_init, next_mode
 from pretouch.params import SequentialParams
 from pretouch.profiles import Profile
@@ -83,11 +82,10 @@ def _by_force(r: ForceRecording, p: Profile) -> tuple[DetectorResult, Decisions]
     force = r.force[newest]
     usable = (ticks - r.time[newest] <= timeout) & (np.abs(force) < p.failure.force_max_n).all(axis=1)
     d = _decided(ticks, np.where(usable[:, None], force, np.nan), p)
-    deaf = _deaf(r.place, "force", d, usable, p)
+    deaf = _deaf(r.place, "force", d, p)
     free = free_cycles(d.judged & ~d.reacting, d)
     summary = _summary(d, free, MovingThresholds.of_kind(p.detect).f_base_n)
-    notes = (*_slower(r.rate, p), *_gaps(r.time, timeout), *deaf)
-    return result_of(p, d, free, float(summary.width_n.max()), summary, notes), d
+    return result_of(p, d, free, summary, (*_slower(r.rate, p), *gaps(r.time, timeout), *deaf)), d
 
 
 def cycles(time: FloatArray, period: float, gap_s: float, hold: bool) -> tuple[FloatArray, IntArray, BoolArray]:
@@ -135,19 +133,12 @@ def _decided(ticks: FloatArray, force: FloatArray, profile: Profile) -> Decision
 def _summary(d: Decisions, free: BoolArray, f_base: float) -> ThresholdSummary:
     beyond, widths = np.maximum(d.compared - d.upper, d.lower - d.compared).max(axis=1), d.upper - d.lower
     return ThresholdSummary(
-        mean_n=_over(free, np.mean, d.force),
-        sigma_n=_over(free, np.std, d.force),
-        window_sigma_n=_over(free, np.median, d.sigma),
-        width_n=_over(free, np.median, widths / 2),
+        mean_n=over(free, np.mean, d.force),
+        sigma_n=over(free, np.std, d.force),
+        width_n=over(free, np.median, widths / 2),
         f_base_n=f_base,
-        f_base_free_n=f_base + float(_over(free, np.max, beyond)),
-        f_base_all_n=f_base + float(_over(d.judged, np.max, beyond)),
+        f_base_all_n=f_base + float(over(d.judged, np.max, beyond)),
     )
-
-
-def _over(cycles: BoolArray, statistic: Callable[..., FloatArray], values: FloatArray) -> FloatArray:
-    """Return a statistic of values (S, ...) over some cycles (S,), NaN over none."""
-    return statistic(values[cycles], axis=0) if cycles.any() else np.full(values.shape[1:], np.nan)
 
 
 def _slower(rate: float, profile: Profile) -> list[Note]:
@@ -156,31 +147,18 @@ def _slower(rate: float, profile: Profile) -> list[Note]:
     return [Note("slower", {"profile": profile.name, "rate": rate, "own": own})] if rate < _SLOWER * own else []
 
 
-def _gaps(time: FloatArray, longer_s: float) -> list[Note]:
-    """Say what time is without a force."""
-    gaps = (steps := np.diff(time))[steps > longer_s]
-    sizes = {"count": len(gaps), "longer_s": longer_s, "seconds": float(gaps.sum())}
-    return [Note("force_gaps", sizes)] if len(gaps) else []
-
-
-def _deaf(place: Path, what: str, course: Course, usable: BoolArray, profile: Profile) -> list[Note]:
-    """Say when nothing could be detected, but for the window's length; RecordingError if that was always.
-
-    `usable` (S,) are the cycles with what the detector needs.
-    """
-    period, deaf, fills = profile.task.control_period_s, ~course.judged, profile.window.samples
-    if deaf.all():
+def _deaf(place: Path, what: str, course: Course, profile: Profile) -> list[Note]:
+    """Say when nothing could be detected, but for the window's length; RecordingError if that was always."""
+    ready, end, period = course.time[course.judged], float(course.time[-1]), profile.task.control_period_s
+    fills = profile.window.samples * period
+    if not len(ready):
         raise RecordingError(
-            f"{place} has {usable.sum() * period:.2f} s of usable {what}, but the window of {profile.name} takes"
-            f" {fills * period:g} s to fill: give a longer recording."
+            f"{place} has {end:.2f} s, but not the {fills:g} s of usable {what} that fill the window of {profile.name}:"
+            " give a longer recording."
         )
-    if deaf.sum() <= fills + 1:
-        return []
-    ends = np.flatnonzero(np.diff(deaf.astype(np.int64), prepend=0, append=0)).reshape(-1, 2)
-    begin, end = ends[np.argmax(np.diff(ends, axis=1))]
-    span = {"seconds": period * int(deaf.sum()), "of": period * len(deaf), "pieces": len(ends)}
-    longest = {"longest": period * int(end - begin), "time": float(course.time[begin])}
-    return [Note("deaf", span | longest | {"profile": profile.name, "what": what})]
+    pauses, deaf = np.diff(ready, prepend=0.0, append=end), end - period * len(ready)
+    span = {"seconds": deaf, "of": end, "longest": float(pauses.max()), "time": [0.0, *ready][pauses.argmax()]}
+    return [Note("deaf", span | {"profile": profile.name, "what": what})] if deaf > fills + NEAR_S else []
 
 
 def _force_of(r: TorqueRecording, period: float) -> ForceRecording:
@@ -203,21 +181,14 @@ def _by_torques(r: TorqueRecording, profile: Profile) -> tuple[DetectorResult, T
     time, newest, first = cycles(r.time, profile.task.control_period_s, GAP_S, hold=False)
     course = _judged(r, profile, time, newest, first)
     name, free = profile.name, free_cycles(course.judged, course)
-    notes += _deaf(r.place, "torques", course, np.isfinite(course.residual).all(axis=1), profile)
+    notes += _deaf(r.place, "torques", course, profile)
     if getattr(profile.detect, "learn", "") == "watched":
         notes.append(Note("unwatched", {"profile": name}))
     notes += _slower(r.rate, profile)
     lengths = [((c.end_s or c.time_s) - c.time_s, c.time_s) for c in course.contacts]
     if lengths and max(lengths)[0] > _LONG_S:
         notes.append(Note("long", dict(zip(("seconds", "time"), max(lengths), strict=True)) | {"profile": name}))
-    summary = TorqueSummary(
-        _over(free, np.mean, course.residual),
-        _over(free, np.std, course.residual),
-        _over(free, np.std, course.tau_ext),
-        float(_over(free, np.max, course.evidence)),
-    )
-    detectable = float(_over(free, np.median, course.detectable_n))
-    return result_of(profile, course, free, detectable, summary, tuple(notes)), course
+    return result_of(profile, course, free, None, notes), course
 
 
 def _for_currents(recording: TorqueRecording, profile: Profile) -> tuple[Profile, list[Note]]:
@@ -238,8 +209,6 @@ def _judged(r: TorqueRecording, profile: Profile, time: FloatArray, newest: IntA
     """Let a detector judge torques at cycles, see `cycles`."""
     body = Body(r.model, Skin((), r.model), profile.task.control_period_s)
     without = np.asarray(np.isnan(r.tau_ext[newest]).any(axis=1))
-    if without.all():
-        raise RecordingError(f"{r.place} has no usable torques: give a longer recording without gaps.")
     contacts, detections = list[DetectedContact](), list[Detection]()
     state, window, waiting = None, window_init(profile.window.samples), True
     for cycle, i in enumerate(newest):

@@ -1,5 +1,7 @@
 """Results of detectors on recordings: numbers for tables and files, and values of each cycle for figures."""
 
+from collections.abc import Callable, Iterable
+
 import numpy as np
 
 from pretouch.imported_data.log import Note
@@ -23,30 +25,12 @@ class ThresholdSummary:
     """(3,) of the force in free motion."""
     sigma_n: FloatArray
     """(3,) standard deviation of the force in free motion."""
-    window_sigma_n: FloatArray
-    """(3,) median of that within the window in free motion, after eq. 8."""
     width_n: FloatArray
     """(3,) median distance of a threshold from the mean between both in free motion."""
     f_base_n: float
     """F_b of the profile."""
-    f_base_free_n: float
-    """F_b above which the free motion would hold no contact."""
     f_base_all_n: float
     """F_b above which the whole recording would hold none."""
-
-
-@value
-class TorqueSummary:
-    """Summary of a detector on torques in free motion, by joint; NaN without any."""
-
-    residual_mean_nm: FloatArray
-    """(n,) of what learnt free motion does not explain of the torques."""
-    residual_sigma_nm: FloatArray
-    """(n,) standard deviation of that."""
-    external_sigma_nm: FloatArray
-    """(n,) standard deviation of the external torques."""
-    largest_evidence: float
-    """A contact from 1 on."""
 
 
 @value
@@ -60,11 +44,12 @@ class DetectorResult:
     """Time in which it could detect."""
     free_s: float
     """Part of it outside contacts and what is near them in time."""
+    largest_evidence: float
+    """Outside contacts; NaN if the detector has none."""
     detectable_n: float
     """Force at the end-effector that the detector itself says it finds: median in free motion, or median distance of a
     threshold from its mean along the worst axis; NaN if it does not say."""
     thresholds: ThresholdSummary | None
-    torques: TorqueSummary | None
     notes: tuple[Note, ...]
 
     @property
@@ -122,24 +107,21 @@ def joint_motion(speeds: FloatArray) -> str:
     return "stopping" if abs(speeds[-1]) <= STILL_RAD_S else "cruising"
 
 
+def over(cycles: BoolArray, statistic: Callable[..., FloatArray], values: FloatArray) -> FloatArray:
+    """Return a statistic of values (S, ...) over some cycles (S,), NaN over none."""
+    return statistic(values[cycles], axis=0) if cycles.any() else np.full(values.shape[1:], np.nan)
+
+
 def result_of(
-    profile: Profile,
-    course: Course,
-    free: BoolArray,
-    detectable: float,
-    summary: ThresholdSummary | TorqueSummary,
-    notes: tuple[Note, ...],
+    profile: Profile, course: Course, free: BoolArray, thresholds: ThresholdSummary | None, notes: Iterable[Note]
 ) -> DetectorResult:
     """Sum up a course; `free` (S,) are the cycles of free motion."""
-    period = profile.task.control_period_s
-    return DetectorResult(
-        profile=profile.name,
-        control_rate_hz=1.0 / period,
-        contacts=course.contacts,
-        armed_s=float(course.judged.sum() * period),
-        free_s=float(free.sum() * period),
-        detectable_n=detectable,
-        thresholds=summary if isinstance(summary, ThresholdSummary) else None,
-        torques=summary if isinstance(summary, TorqueSummary) else None,
-        notes=notes,
-    )
+    period, evidence = profile.task.control_period_s, np.nan
+    if isinstance(course, TorqueCourse):
+        evidence = float(over(free, np.max, course.evidence))
+        detectable = float(over(free, np.median, course.detectable_n))
+    else:
+        detectable = float(thresholds.width_n.max()) if thresholds else np.nan
+    armed_s, free_s = (float(cycles.sum() * period) for cycles in (course.judged, free))
+    rate, contacts = 1.0 / period, course.contacts
+    return DetectorResult(profile.name, rate, contacts, armed_s, free_s, evidence, detectable, thresholds, tuple(notes))

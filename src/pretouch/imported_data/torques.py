@@ -64,7 +64,8 @@ def torque_recording(log: Log, choice: Choice) -> TorqueRecording:
     _check_options(log.place, kind, model.n, choice)
     log = log.in_order(*log.arrays)
     time = (log.time - log.time[0]) / 1e9
-    notes = [*log.notes, *_gaps(log.place, time)]
+    _check_rate(log.place, time)
+    notes = [*log.notes, *gaps(time)]
     q = log.arrays["q"]
     check_reach(log.place, q, model)
     derived = velocities(time, q)
@@ -174,16 +175,10 @@ def _check_signs(
     right = (same < _FAR_BETTER * other) & (same < _MOST * whole)
     rest, arm = float(np.where(wrong, other, same).sum() / max(whole.sum(), 1e-12)), model.description.name
     if wrong.any() and rest < _MOST:
-        if not right.any():
-            raise RecordingError(
-                f"The torques in {place} are minus those that hold the arm: they have the other sign, so give --sign"
-                f" {'on' if by_robot else 'by'}-robot."
-            )
         one, others = (listed([model.joints[j] for j in np.flatnonzero(which)]) for which in (wrong, right))
-        raise RecordingError(
-            f"The torques in {place} have the other sign than the model's at {one}, but not at {others}: turn the first"
-            " round, currents by a minus in --gains."
-        )
+        way = f"but not at {others}: turn the first round, currents by a minus in --gains"
+        way = way if right.any() else f"so give --sign {'on' if by_robot else 'by'}-robot"
+        raise RecordingError(f"The torques in {place} are minus those that move the arm at {one}, {way}.")
     if by_robot and rest >= _MOST:
         raise RecordingError(
             f"With --sign by-robot the model of {arm} leaves {rest:.0%} of the torques in {place} unexplained: leave it"
@@ -192,17 +187,22 @@ def _check_signs(
     return [Note("unexplained", {"share": rest, "arm": arm})] if rest >= _MOST else []
 
 
-def _gaps(place: Path, time: FloatArray) -> list[Note]:
-    """Say what gaps there are between instants (N,) [s]; RecordingError for a rate that is too low."""
-    steps = np.diff(time)
-    rate = 1.0 / float(np.median(steps))
+def _check_rate(place: Path, time: FloatArray) -> None:
+    """Refuse instants (N,) [s] that come too slowly."""
+    rate = 1.0 / float(np.median(np.diff(time)))
     if rate < _LEAST_HZ:
         raise RecordingError(
             f"The samples of {place} come at {rate:.3g} Hz: record at {_LEAST_HZ:g} Hz or more, or check the unit of"
             " the time."
         )
-    gaps = steps[steps > GAP_S]
-    return [Note("gaps", {"count": len(gaps), "longer_s": GAP_S, "seconds": float(gaps.sum())})] if len(gaps) else []
+
+
+def gaps(time: FloatArray, longer_s: float = GAP_S) -> list[Note]:
+    """Say what gaps longer than so much there are between instants (N,) [s]."""
+    steps = np.diff(time)
+    some = steps[steps > longer_s]
+    sizes = {"count": len(some), "longer_s": longer_s, "seconds": float(some.sum())}
+    return [Note("gaps", sizes)] if len(some) else []
 
 
 def pieces(time: FloatArray, gap_s: float = GAP_S) -> list[slice]:

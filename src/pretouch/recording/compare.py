@@ -27,7 +27,7 @@ whether the force window was full, whether a reaction was under way, and the con
 
 @value
 class Circumstances:
-    """What an alarm by joint torques looked like, n joints."""
+    """An alarm by joint torques as somebody would judge it, n joints."""
 
     joint: str
     """The joint whose residual is largest beside its deviation."""
@@ -40,7 +40,7 @@ class Circumstances:
     speed_rad_s: FloatArray
     """(n,) commanded velocities [rad/s]."""
     doing: tuple[str, ...]
-    """What each joint was doing, see `joint_motion`."""
+    """Motion of each joint, see `joint_motion`."""
 
 
 @value
@@ -66,7 +66,7 @@ class DetectedContact:
     evidence: float | None = None
     """Largest of the contact."""
     circumstances: Circumstances | None = None
-    """Of the alarm; None without joint torques."""
+    """Those of the alarm; None without joint torques."""
 
     @property
     def norm_n(self) -> float:
