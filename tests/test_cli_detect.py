@@ -9,9 +9,7 @@ import pytest
 
 from pretouch.cli.detect import Detect
 from pretouch.errors import ParameterError, PretouchError, RecordingError
-from pretouch.recording.writer import Recording
 from pretouch.units.skin_recording import SkinRecording
-from tests.following_arm import Arm
 from tests.imported_data.files import PUSHES, force_columns, pushed, wrenches, write_bag, write_csv
 from tests.imported_data.joint_files import Moving
 from tests.units.traffic import heard
@@ -91,20 +89,6 @@ def test_bad_input_is_one_sentence_and_nothing_is_printed(capsys, file, given, e
         Detect(**{"file": file} | given).run()
     assert "\n" not in str(caught.value)
     assert capsys.readouterr().out == ""
-
-
-def test_a_recording_of_ours_gives_the_contacts_and_thresholds_it_holds(capsys, tmp_path, panda_model, paper_skin):
-    arm, place, numbers = Arm(panda_model, paper_skin), tmp_path / "ours.mcap", tmp_path / "a.json"
-    with Recording(place, arm.controller) as recording:
-        cycles = [arm.turn(tuple(sample)) for sample in pushed(6.0, PUSHES[:1])]
-        for cycle in cycles:
-            recording.record(cycle)
-    Detect(place, profiles=("paper",), json=numbers).run()
-    (paper,) = json.loads(numbers.read_text())["profiles"]
-    contacts = [cycle.step for cycle in cycles if cycle.step.contact is not None]
-    assert len(contacts) == 1
-    assert [c["time_s"] for c in paper["contacts"]] == pytest.approx([s.stamp + 0.005 for s in contacts])
-    assert paper["contacts"][0]["force_n"] == pytest.approx(list(contacts[0].contact.force), abs=0.05)
 
 
 @pytest.fixture(scope="module")

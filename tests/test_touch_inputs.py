@@ -125,7 +125,7 @@ def test_without_sensors_in_the_skin_or_without_the_switch_no_bit_changes(panda_
         assert all(
             same(replace(a, reason=""), replace(b, reason="")) for a, b in zip(plain.steps, found.steps, strict=True)
         )
-    assert not PROFILES["paper"].detect.reads_touch
+    assert PROFILES["paper"].detect.touch is None
 
 
 def test_the_loop_hands_on_what_a_skin_feels(panda_model, feeling):

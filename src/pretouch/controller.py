@@ -84,7 +84,7 @@ class Controller:
         self.approach = profile.approach if self.kinds.approach == PYTHON else None
         """A restriction in plain Python; None if it is compiled."""
         self._begin_approach = None if self.approach is None else self.approach.init(self.motion_body)
-        self.touching = profile.detect.reads_touch and len(skin.touching) > 0
+        self.touching = profile.detect.touch is not None and len(skin.touching) > 0
         see = profile.perception
         self.remembers = see is not None and see.memory is not None
         self.slots = len(model.parts) * see.memory.per_link if see is not None and see.memory else len(skin)

@@ -109,7 +109,9 @@ def test_after_a_gap_there_is_no_force_and_nothing_is_felt_until_it_comes_back(t
     assert np.isfinite(found.force[(found.time > 7.99) & (found.time < 8.18)]).all()
     gap, deaf = detect(imported, PAPER)[0].notes
     assert (gap.code, gap.values["count"], gap.values["seconds"]) == ("gaps", 1, pytest.approx(7.01))
-    assert deaf.values["seconds"] == pytest.approx(1.0 + 7.01 - 0.2, abs=0.02)
+    values = {name: deaf.values[name] for name in ("seconds", "of", "longest", "time")}
+    # the window fills for 1 s, and a force holds for 0.2 s
+    assert values == pytest.approx({"seconds": 7.81, "of": 20.0, "longest": 6.81, "time": 8.19}, abs=0.03)
 
 
 def test_a_gap_of_days_costs_no_time_and_no_memory(tmp_path):
@@ -131,7 +133,7 @@ def test_samples_that_are_no_estimate_leave_the_window_as_it_is(of_force, broken
 
 
 def test_data_too_short_or_too_slow_are_one_sentence(of_force):
-    with pytest.raises(RecordingError, match=r"has 0\.8\d s, but not the 1 s of usable force that fill"):
+    with pytest.raises(RecordingError, match=r"has 0\.90 s, but not the 1 s of usable force that fill"):
         decided(of_force(pushed(0.9, ())), PAPER)
     with pytest.raises(RecordingError, match=r"comes every 1 s.*unit of the time"):
         decided(of_force(pushed(100.0, (), rate=1.0), 1.0), PAPER)
@@ -154,6 +156,5 @@ def test_the_noise_in_free_motion_is_that_of_the_data(of_force):
     # eq. 8 makes outliers smaller, and so the deviation in the window
     assert np.all((noise.width_n > 10.0) & (noise.width_n < 10.0 + noise.sigma_n))
     assert result.armed_s == pytest.approx(59.0, abs=0.05)
-    assert 50.0 < result.free_s < 53.0
     assert len(result.contacts) == 3
     assert result.contacts_per_hour == pytest.approx(3 * 3600 / 59.0, rel=0.01)

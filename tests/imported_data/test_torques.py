@@ -105,7 +105,7 @@ def at_rest(recording, q, push):
     return replace(recording, q=still + q, qd=still, qd_commanded=still, tau_ext=noise + pushed)
 
 
-def test_near_a_singularity_torques_detect_and_a_force_says_that_it_is_deaf(tmp_path, short, panda_model):
+def test_near_a_singularity_torques_detect_and_a_force_says_that_it_cannot(tmp_path, short):
     recording = read_torques(short.external_csv(tmp_path / "a.csv"), Choice())
     stretched = np.array([0.0, 0.0, -1.5, -0.1, 2.8, 0.16, 0.0])
     deaf = at_rest(recording, stretched, np.array([4.0, 0, 8, 0, 0, 0, 0]))
@@ -117,12 +117,6 @@ def test_near_a_singularity_torques_detect_and_a_force_says_that_it_is_deaf(tmp_
     assert result.contacts_per_hour == pytest.approx(720.0, rel=0.01)
     with pytest.raises(RecordingError, match=r"not the 1 s of usable force that fill the window of paper"):
         detect(deaf, profile("paper"))
-    turned = recording.time > 3.0
-    partly = replace(deaf, q=np.where(turned[:, None], stretched, panda_model.description.q_ready))
-    (note,) = [note for note in detect(partly, profile("paper"))[0].notes if note.code == "deaf"]
-    values = {name: note.values[name] for name in ("seconds", "of", "longest", "time")}
-    # 1 s while the window fills, and 3 s near the singularity
-    assert values == pytest.approx({"seconds": 4.0, "of": 6.0, "longest": 3.0, "time": 3.0}, abs=0.03)
 
 
 @pytest.mark.parametrize(

@@ -224,7 +224,6 @@ def _detection(results: list[DetectorResult]) -> TextTable:
         ("profile", lambda r: r.profile),
         ("contacts", lambda r: str(len(r.contacts))),
         ("armed [s]", lambda r: shown(r.armed_s, 1)),
-        ("free [s]", lambda r: shown(r.free_s, 1)),
         ("contacts per hour", lambda r: shown(r.contacts_per_hour, 1)),
         ("evidence without contact", lambda r: shown(r.largest_evidence, 2)),
         ("detectable [N]", lambda r: shown(r.detectable_n, 1)),

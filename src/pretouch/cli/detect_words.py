@@ -28,6 +28,7 @@ _SENTENCES = {
     "no_commands": "There are no commanded velocities (dq_d1_rad_s ...): the measured ones, smoothed, stand in.",
     "unexplained": "The model of {arm} leaves {share:.0%} of the torques unexplained, so results may be wrong: check"
     " --arm, --payload, units and how the arm is mounted.",
+    "unsure_signs": "The sign of the torques cannot be told at {names}: check it, or record more motion.",
     "slower": "The data come at {rate:.4g} Hz and the detector of {profile} runs at {own:.4g} Hz: repeated samples"
     " count several times, and lower sigma; --rate {rate:.4g} runs it at the data's own rate.",
     "deaf": "{profile} could detect nothing in {seconds:.1f} of {of:.1f} s, longest for {longest:.1f} s from"

@@ -9,6 +9,7 @@ import numpy as np
 from pretouch.composition import Part
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.contact.window import Window
+from pretouch.params import TouchSensorParams
 from pretouch.robot.body import Capsules, no_capsules
 from pretouch.robot.kinematics import Kinematics, below
 from pretouch.robot.model import RobotModel
@@ -90,10 +91,8 @@ class Detector(Part, group="pretouch.detectors"):
     by_torques: ClassVar[bool] = True
     """True if it uses the external joint torques, False if it uses the force."""
 
-    @property
-    def reads_touch(self) -> bool:
-        """True if it uses the units' touch readings."""
-        return False
+    touch: TouchSensorParams | None = None
+    """Weight of the units' touch sensors; None: they do not count."""
 
     def counted(self, robot: RobotState, window: Window) -> FloatArray | None:
         """Return the force (3,) [N] that fills the window and so arms the detector; None in a step that does not.

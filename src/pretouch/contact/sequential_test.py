@@ -44,11 +44,6 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
 
     State = SequentialTestState
 
-    @property
-    def reads_touch(self) -> bool:
-        """True if touch sensors count."""
-        return self.touch is not None
-
     def init(self, body: Body, learnt: ResidualModel | None = None) -> SequentialTestState:
         """Return the state before the first step."""
         test = sequential_init(body.model.n, self, learnt)

@@ -42,10 +42,8 @@ class DetectorResult:
     contacts: tuple[DetectedContact, ...]
     armed_s: float
     """Time in which it could detect."""
-    free_s: float
-    """Part of it outside contacts and what is near them in time."""
     largest_evidence: float
-    """Outside contacts; NaN if the detector has none."""
+    """Largest evidence outside contacts; NaN for thresholds."""
     detectable_n: float
     """Force at the end-effector that the detector itself says it finds: median in free motion, or median distance of a
     threshold from its mean along the worst axis; NaN if it does not say."""
@@ -117,11 +115,9 @@ def result_of(
 ) -> DetectorResult:
     """Sum up a course; `free` (S,) are the cycles of free motion."""
     period, evidence = profile.task.control_period_s, np.nan
+    detectable = float(thresholds.width_n.max()) if thresholds else np.nan
     if isinstance(course, TorqueCourse):
         evidence = float(over(free, np.max, course.evidence))
         detectable = float(over(free, np.median, course.detectable_n))
-    else:
-        detectable = float(thresholds.width_n.max()) if thresholds else np.nan
-    armed_s, free_s = (float(cycles.sum() * period) for cycles in (course.judged, free))
-    rate, contacts = 1.0 / period, course.contacts
-    return DetectorResult(profile.name, rate, contacts, armed_s, free_s, evidence, detectable, thresholds, tuple(notes))
+    armed_s, rate, contacts = float(course.judged.sum() * period), 1.0 / period, course.contacts
+    return DetectorResult(profile.name, rate, contacts, armed_s, evidence, detectable, thresholds, tuple(notes))

@@ -161,7 +161,7 @@ def _check_signs(
     """Find the sign of each joint's measured torques (N, n) [Nm] with which model and friction explain them.
 
     `expected` (S, n) are the model's, `by_robot` tells that all are turned round already. RecordingError for reversed
-    joints, and for torques turned round that stay unexplained; a note for others that do.
+    joints, and for torques turned round that stay unexplained; notes for others that do, and for unsure joints.
     """
     qd, tau, joints = _some(qd), _some(tau), np.arange(model.n)
     turning = np.stack([np.tanh(qd / _REVERSING_RAD_S), qd], axis=2)
@@ -184,7 +184,9 @@ def _check_signs(
             f"With --sign by-robot the model of {arm} leaves {rest:.0%} of the torques in {place} unexplained: leave it"
             " out, and check --arm, --payload and how the arm is mounted."
         )
-    return [Note("unexplained", {"share": rest, "arm": arm})] if rest >= _MOST else []
+    unexplained = [Note("unexplained", {"share": rest, "arm": arm})] if rest >= _MOST else []
+    unsure = [model.joints[j] for j in np.flatnonzero(~right)]
+    return [*unexplained, *([Note("unsure_signs", {"names": listed(unsure)})] if unsure else [])]
 
 
 def _check_rate(place: Path, time: FloatArray) -> None:
