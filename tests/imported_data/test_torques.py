@@ -142,9 +142,9 @@ def test_links_that_explain_the_torques_as_well_are_named_and_no_other(panda_mod
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"tau": -1.0}, "minus those that move the arm at 'panda_joint1', "),
-        ({"tau": [-1, -1, -1, 1, -1, -1, -1]}, "arm at 'panda_joint1', 'panda_joint2', 'panda_joint3', 'panda_joint5'"),
-        ({"tau": [1, 1, 1, -1, 1, 1, 1]}, "those that move the arm at 'panda_joint4', but not at 'panda_joint1', "),
+        ({"tau": -1.0}, "are minus the model's at 'panda_joint1', "),
+        ({"tau": [-1, -1, -1, 1, -1, -1, -1]}, "at 'panda_joint1', 'panda_joint2', 'panda_joint3', 'panda_joint5', "),
+        ({"tau": [1, 1, 1, -1, 1, 1, 1]}, "are minus the model's at 'panda_joint4', but not at 'panda_joint1', "),
         ({"tau": 1000.0}, "in mNm, name the columns tau1_mNm"),
         ({"q": 180 / np.pi}, "as degrees all are within: name the columns q1_deg"),
         ({"dq": 180 / np.pi}, "so they are in degrees: name the columns dq1_deg_s"),

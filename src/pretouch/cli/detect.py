@@ -20,7 +20,7 @@ from pretouch.extras import FIGURES
 from pretouch.imported_data.detect import detect
 from pretouch.imported_data.log import TORQUES, Choice
 from pretouch.imported_data.reading import ForceRecording, open_log, read_force
-from pretouch.imported_data.results import Course, DetectorResult
+from pretouch.imported_data.results import Course, DetectorResult, TorqueCourse
 from pretouch.imported_data.torques import TorqueRecording, torque_recording
 from pretouch.profiles import Profile, at_rate
 from pretouch.profiles import profile as find_profile
@@ -150,18 +150,16 @@ class _Results:
     def _figures(self) -> list[tuple["Figure", str]]:
         """Draw figures, each with its caption."""
         from pretouch.imported_data.figures import decisions_figure, torque_figure  # needs the extra
-        from pretouch.recording.compare import Decisions
 
         title, caption = self.recording.place.name, "joint torques, what free motion does not explain of them, and"
-        figures = []
+        figures, forces = [], []
         for result, course in zip(self.results, self.courses, strict=True):
-            if not isinstance(course, Decisions):
+            if isinstance(course, TorqueCourse):
                 figure = torque_figure(course, self.recording.model.joints, f"{title}: {result.profile}")
                 figures.append((figure, f"{result.profile}: {caption} the evidence. Red: contacts."))
-        if forces := [course for course in self.courses if isinstance(course, Decisions)]:
-            where = "at the end-effector by the torques" if figures else "along each axis"
-            figures.append((decisions_figure(forces, title), f"Force {where}, thresholds, and contacts."))
-        return figures
+            else:
+                forces.append(course)
+        return figures + [(decisions_figure(forces, title), "Force, thresholds, and contacts.")] * bool(forces)
 
 
 def _answer(recording: ForceRecording | TorqueRecording, profiles: Sequence[Profile]) -> _Results:

@@ -20,7 +20,7 @@ _SENTENCES = {
     "zeros_missing": "Force: {samples} all zeros and count as no estimate (--zeros kept).",
     "zeros_kept": "Force: {samples} all zeros, which on a Franka arm means no estimate (--zeros missing).",
     "looks_ee": "The force's frame_id is {frame!r}: if that is the end-effector's, add --frame ee.",
-    "gaps": "{gaps} of more than {longer_s:g} s, {seconds:.2f} s in all: torques begin anew after it.",
+    "gaps": "{gaps} of more than {longer_s:g} s without a sample, {seconds:.2f} s in all.",
     "no_motion": "No joint moves: sign and unit of the velocities cannot be checked.",
     "velocities": "The velocities are {ratio:.2g} times those of the positions, with a correlation of"
     " {correlation:.2f} at the worst joint: check them.",

@@ -83,9 +83,8 @@ def _by_force(r: ForceRecording, p: Profile) -> tuple[DetectorResult, Decisions]
     usable = (ticks - r.time[newest] <= timeout) & (np.abs(force) < p.failure.force_max_n).all(axis=1)
     d = _decided(ticks, np.where(usable[:, None], force, np.nan), p)
     deaf = _deaf(r.place, "force", d, p)
-    free = free_cycles(d.judged & ~d.reacting, d)
-    summary = _summary(d, free, MovingThresholds.of_kind(p.detect).f_base_n)
-    return result_of(p, d, free, summary, (*_slower(r.rate, p), *gaps(r.time, timeout), *deaf)), d
+    summary = _summary(d, free_cycles(d.judged & ~d.reacting, d), MovingThresholds.of_kind(p.detect).f_base_n)
+    return result_of(p, d, summary, (*_slower(r.rate, p), *gaps(r.time, timeout), *deaf)), d
 
 
 def cycles(time: FloatArray, period: float, gap_s: float, hold: bool) -> tuple[FloatArray, IntArray, BoolArray]:
@@ -180,7 +179,7 @@ def _by_torques(r: TorqueRecording, profile: Profile) -> tuple[DetectorResult, T
     profile, notes = _for_currents(r, profile)
     time, newest, first = cycles(r.time, profile.task.control_period_s, GAP_S, hold=False)
     course = _judged(r, profile, time, newest, first)
-    name, free = profile.name, free_cycles(course.judged, course)
+    name = profile.name
     notes += _deaf(r.place, "torques", course, profile)
     if getattr(profile.detect, "learn", "") == "watched":
         notes.append(Note("unwatched", {"profile": name}))
@@ -188,7 +187,7 @@ def _by_torques(r: TorqueRecording, profile: Profile) -> tuple[DetectorResult, T
     lengths = [((c.end_s or c.time_s) - c.time_s, c.time_s) for c in course.contacts]
     if lengths and max(lengths)[0] > _LONG_S:
         notes.append(Note("long", dict(zip(("seconds", "time"), max(lengths), strict=True)) | {"profile": name}))
-    return result_of(profile, course, free, None, notes), course
+    return result_of(profile, course, None, notes), course
 
 
 def _for_currents(recording: TorqueRecording, profile: Profile) -> tuple[Profile, list[Note]]:

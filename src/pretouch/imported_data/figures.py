@@ -17,17 +17,14 @@ def decisions_figure(columns: Sequence[Decisions], title: str) -> Figure:
     figure = Figure(figsize=(3 + 5 * len(columns), 8), layout="constrained")
     panels = figure.subplots(3, len(columns), sharex=True, sharey="row", squeeze=False)
     for column, decisions in zip(panels.T, columns, strict=True):
-        count = len(decisions.contacts)
         name = decisions.name.replace(":", "\n")
-        column[0].set_title(f"{name}\n{count} contact{'s' * (count != 1)}", fontsize="medium")
+        column[0].set_title(f"{name}\ncontacts: {len(decisions.contacts)}", fontsize="medium")
         for axis, axes in enumerate(column):
             _panel(axes, decisions, axis)
         column[-1].set_xlabel("time [s]")
     for axis, axes in enumerate(panels[:, 0]):
         axes.set_ylabel(f"force along {_AXES[axis]} [N]")
-    pairs = [axes.get_legend_handles_labels() for axes in panels[0]]
-    legend = {label: handle for pair in pairs for handle, label in zip(*pair, strict=True)}
-    figure.legend(list(legend.values()), list(legend), loc="outside lower center", ncols=5, fontsize="small")
+    panels[0, 0].legend(fontsize="x-small", ncols=2)
     figure.suptitle(title, fontsize="medium")
     return figure
 

@@ -111,12 +111,13 @@ def over(cycles: BoolArray, statistic: Callable[..., FloatArray], values: FloatA
 
 
 def result_of(
-    profile: Profile, course: Course, free: BoolArray, thresholds: ThresholdSummary | None, notes: Iterable[Note]
+    profile: Profile, course: Course, thresholds: ThresholdSummary | None, notes: Iterable[Note]
 ) -> DetectorResult:
-    """Sum up a course; `free` (S,) are the cycles of free motion."""
+    """Sum up a course."""
     period, evidence = profile.task.control_period_s, np.nan
     detectable = float(thresholds.width_n.max()) if thresholds else np.nan
     if isinstance(course, TorqueCourse):
+        free = free_cycles(course.judged, course)
         evidence = float(over(free, np.max, course.evidence))
         detectable = float(over(free, np.median, course.detectable_n))
     armed_s, rate, contacts = float(course.judged.sum() * period), 1.0 / period, course.contacts

@@ -178,7 +178,7 @@ def _check_signs(
         one, others = (listed([model.joints[j] for j in np.flatnonzero(which)]) for which in (wrong, right))
         way = f"but not at {others}: turn the first round, currents by a minus in --gains"
         way = way if right.any() else f"so give --sign {'on' if by_robot else 'by'}-robot"
-        raise RecordingError(f"The torques in {place} are minus those that move the arm at {one}, {way}.")
+        raise RecordingError(f"The torques in {place} are minus the model's at {one}, {way}, or check its mounting.")
     if by_robot and rest >= _MOST:
         raise RecordingError(
             f"With --sign by-robot the model of {arm} leaves {rest:.0%} of the torques in {place} unexplained: leave it"

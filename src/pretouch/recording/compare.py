@@ -55,8 +55,6 @@ class DetectedContact:
     """Axes whose threshold was crossed, as "xz"."""
     link: str | None = None
     """The link that is touched; None where the profile does not say or the torques cannot tell."""
-    links: tuple[str, ...] = ()
-    """All links that the torques could be of, one a rigid body, the likeliest first."""
     point_m: FloatArray | None = None
     """(3,) where on the likeliest link's surface, base frame; None where the profile does not say."""
     end_s: float | None = None
@@ -65,6 +63,8 @@ class DetectedContact:
     """That it is the likeliest link's rigid body, if a touch is as likely on all of the arm's surface."""
     evidence: float | None = None
     """Largest of the contact."""
+    links: tuple[str, ...] = ()
+    """All links that the torques could be of, one a rigid body, the likeliest first."""
     circumstances: Circumstances | None = None
     """Those of the alarm; None without joint torques."""
 
