@@ -149,8 +149,7 @@ class Decision:
             self.stamp, self.kin, robot, window, before.full, self.near, reacting, self.watched, self.touches, doubted
         )
         detection, detector = p.detect.step(self.controller.whole_detector(state), self.controller.body, sample)
-        if reacting and p.window.freeze_while_reacting:
-            window = before
+        window = before if reacting and p.window.freeze_while_reacting else window
         memory.fill("window", window)
         self.now.put("filtered_force", window.newest)
         if not detection.armed and p.detect.by_torques and bool(np.isnan(detection.residual).any()):

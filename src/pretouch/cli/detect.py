@@ -159,7 +159,7 @@ class _Results:
                 figures.append((figure, f"{result.profile}: {caption} the evidence. Red: contacts."))
             else:
                 forces.append(course)
-        return figures + [(decisions_figure(forces, title), "Force, thresholds, and contacts.")] * bool(forces)
+        return [*figures, (decisions_figure(forces, title), "Force, thresholds, and contacts.")] if forces else figures
 
 
 def _answer(recording: ForceRecording | TorqueRecording, profiles: Sequence[Profile]) -> _Results:
