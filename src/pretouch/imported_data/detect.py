@@ -153,7 +153,7 @@ def _deaf(place: Path, what: str, course: Course, profile: Profile) -> list[Note
     if not len(ready):
         raise RecordingError(
             f"{place} has {end:.2f} s, but not the {fills:g} s of usable {what} that fill the window of {profile.name}:"
-            " give a longer recording."
+            " give a longer recording, not all of it near a singularity."
         )
     pauses, deaf = np.diff(ready, prepend=0.0, append=end), end - period * len(ready)
     span = {"seconds": deaf, "of": end, "longest": float(pauses.max()), "time": [0.0, *ready][pauses.argmax()]}
