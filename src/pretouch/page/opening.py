@@ -1,7 +1,8 @@
 """The opening of a live page: a person's hand comes into the arm's way, pushes it back, and withdraws.
 
-Only the hand is scripted. It reaches for an arm that has waited for it, and pushes one that has touched it. The arm, its sensors and its
-controller do what they do for any hand: a controller that does not see it runs into it at full speed.
+Only the hand is scripted. It reaches for an arm that has waited for it, and pushes one that has touched it. The arm,
+its sensors and its controller do what they do for any hand: a controller that does not see it runs into it at full
+speed.
 """
 
 import numpy as np

@@ -62,6 +62,8 @@ class LiveSettings(Checked):
     """Decides the arm's errors and all noise."""
     plant: PlantParams = field(default_factory=PlantParams)
     """The kind of simulated arm."""
+    ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
+    """Errors of simulated units."""
     hand_start: tuple[float, float, float] = (1.0, 0.5, 0.3)
     """Start of the person's hand [m], base frame: in view, and clear of both paths."""
     placement: Placement = field(default_factory=Placement)
@@ -157,7 +159,7 @@ class Room:
         self.mouse = Mouse(np.array(settings.hand_start), scene, hand, settings.placement.scale)
         self.scene = replace(scene, hand=replace(hand, start=tuple(self.mouse.target.tolist())))
         self.plant = Plant(model, self.scene, settings.plant, q, settings.seed)
-        self._simulated = None if real else RangeFinders(self.plant, skin, RangeFinderParams(), settings.seed)
+        self._simulated = None if real else RangeFinders(self.plant, skin, settings.ranging, settings.seed)
         self.units: UnitPort = self._simulated or cast(RealUnits, real)
         if self._simulated and len(skin.touching):
             touch = TouchSensors(self.plant, skin, TouchErrors(), settings.seed)

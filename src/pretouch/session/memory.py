@@ -137,7 +137,8 @@ def load_learnt(path: Path, arm: RobotModel, p: SequentialParams) -> tuple[Resid
     for name in _LASTING:
         if name not in arrays or arrays[name].shape != getattr(fresh, name).shape:
             raise RobotModelError(f"{path}: {name} is not of the shape {getattr(fresh, name).shape}: {_ANEW}.")
-    learnt = fresh._replace(**{name: arrays[name] for name in _LASTING})
+    lasting: dict[str, Any] = {name: arrays[name] for name in _LASTING}
+    learnt = fresh._replace(**lasting)
     try:
         check_learnt(learnt, arm)
     except ParameterError as error:
