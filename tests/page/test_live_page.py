@@ -159,7 +159,6 @@ def test_what_is_refused_is_said_until_the_next_click_though_the_hand_moves_and_
     clock.page.actions.put(lambda: set_speed(simulation, -1.0))
     clock.turn(0.1)
     assert simulation.world.profile == before
-    give(clock.page, "x [m]", 0.9)
     give(clock.page, "Cones", False)
     clock.page._drag(np.array(CAMERA_FROM), np.array([1.0, 0.4, 0.3]))
     clock.turn(0.1)
