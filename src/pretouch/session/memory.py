@@ -123,7 +123,7 @@ def load_learnt(path: Path, arm: RobotModel, p: SequentialParams) -> tuple[Resid
     """Read a file of free motion: model, robot, instant of saving; one that cannot be used is a RobotModelError."""
     try:
         stored = msgspec.convert(parse_toml(path.read_bytes()), _StoredMotion)
-        arrays = {name: np.array(array, np.float64) for name, array in stored.array.items()}
+        arrays: dict[str, Any] = {name: np.array(array, np.float64) for name, array in stored.array.items()}
     except OSError as error:
         raise RobotModelError(f"The file {path} cannot be read: {error.strerror}: give one that was saved.") from error
     except (ValueError, TypeError, msgspec.MsgspecError) as error:  # not of TOML, not UTF-8, or of something else
