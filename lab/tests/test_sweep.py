@@ -12,10 +12,9 @@ from pretouch import cli
 from pretouch.errors import ExperimentError
 from pretouch.profiles import profile
 from pretouch.sensing.sensor import PAPER_SENSOR
-from pretouch.sim.randomisation import drawn, world_set
 from pretouch_lab import sweep as sweeps
 from pretouch_lab.bench.dense_skin import UNITS, units_of
-from pretouch_lab.domain_randomisation import named_set
+from pretouch_lab.domain_randomisation import drawn, named_set, world_set
 from pretouch_lab.experiments import dynamic, static
 from pretouch_lab.options import SweepOptions
 from pretouch_lab.sweep import (

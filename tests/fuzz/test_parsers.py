@@ -26,7 +26,6 @@ from pretouch.robot.description import description_text, load_description, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin, paper_skin, skin_file
 from pretouch.session.memory import load_learnt, save_learnt
-from pretouch.sim.randomisation import FOLDER, world_set
 from pretouch.types import RangeStatus
 from pretouch.units.keys import load_keys, save_keys
 from pretouch.units.skin_reader import read_skin
@@ -47,7 +46,7 @@ MEMORY = 400_000_000
 """Largest memory that Python and NumPy may take for it [B]."""
 NAMES = (
     "recording", "recording of units", "CSV of forces", "CSV of torques", "ROS bag", "URDF", "skin", "keys",
-    "world", "learnt", "description", "profile", "wire",
+    "learnt", "description", "profile", "wire",
 )  # fmt: skip
 
 
@@ -156,11 +155,10 @@ def _of_tomls(folder: Path, model: RobotModel) -> dict[str, Parser]:
 
     (folder / "described").mkdir()
     (folder / "described" / panda().mjcf.name).write_bytes(panda().mjcf.read_bytes())
-    described, world = description_text(panda()).encode(), (FOLDER / "realistic.toml").read_bytes()
+    described = description_text(panda()).encode()
     return {
         "skin": _of_file(folder, "s.toml", partial(load_skin, model=model), skin_file(panda()).read_bytes()),
         "keys": _of_file(folder, "k.toml", keys, (folder / "keys.toml").read_bytes()),
-        "world": _of_file(folder, "w.toml", lambda p: world_set(str(p)), world, world.replace(b"0.06", _HUGE)),
         "learnt": _of_file(folder, "l.toml", read_learnt, (folder / "learnt.toml").read_bytes()),
         "description": _of_file(folder / "described", "robot.toml", load_description, described),
     }

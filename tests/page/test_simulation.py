@@ -19,7 +19,6 @@ from pretouch.robot.postures import brought_to
 from pretouch.sim.hand import Hand, PersonArm
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import HandSpec, SceneSpec, fixtures
 from pretouch.types import ControlStep, Mode
@@ -47,20 +46,6 @@ def test_a_session_runs_as_an_experiment_does(live, panda_model, paper_skin):
         assert ours.stamp == theirs.stamp
         np.testing.assert_array_equal(ours.command, theirs.command)
         np.testing.assert_array_equal(ours.range_distance, theirs.range_distance)
-
-
-def test_units_measure_from_where_they_sit_and_are_believed_where_they_do_not(live, panda_model, paper_skin):
-    settings = LiveSettings(seed=7, object="board -y")
-    believed, _ = misplaced(paper_skin, panda_model, Misplacement(50.0, 20.0), 7)
-    session = LiveSimulation(settings, panda_model, believed, None, paper_skin)
-    assert session.world.skin is believed
-    sound = live(seed=7, object="board -y")
-    first, steps = sound.advance(0.5), session.advance(0.5)
-    seen = [(a, b) for a, b in zip(first, steps, strict=True) if len(a.obstacles.unit)]
-    assert seen
-    # the same readings at first, before what is believed moves the arm otherwise
-    np.testing.assert_array_equal(seen[0][0].range_distance, seen[0][1].range_distance)
-    assert not np.array_equal(seen[0][0].obstacles.point, seen[0][1].obstacles.point)
 
 
 def test_time_passes_in_whole_cycles_and_the_rest_is_kept(live):

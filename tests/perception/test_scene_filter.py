@@ -1,5 +1,6 @@
 """What a sensor is expected to see of the arm and of fixtures, which is no obstacle."""
 
+from contextlib import suppress
 from dataclasses import replace
 
 import mujoco
@@ -11,6 +12,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 from tests.perception.watcher import FLOOR, HAND_LEFT, Watcher
 
+from pretouch.errors import SkinError
 from pretouch.params import PerceptionParams
 from pretouch.perception.closest import closest_points
 from pretouch.perception.obstacles import placed_sensors
@@ -19,9 +21,9 @@ from pretouch.profiles import PROFILES
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import panda
 from pretouch.robot.kinematics import Kinematics
+from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensors, cone_rays, cones_of
 from pretouch.sensing.skin import Skin, skin_for
-from pretouch.sim.random_skin import Misplacement, misplaced
 
 INF = np.inf
 NOTHING = no_fixtures()
@@ -197,13 +199,28 @@ def test_the_arm_is_seen_where_mujocos_rays_meet_it(panda_model, paper_skin, muj
 ASIDE = PerceptionParams(self_aside_m=0.005)
 
 
+def placed_by_hand(skin: Skin, model: RobotModel, seed: int) -> Skin:
+    """Units 5 mm off in random directions, and turned by 3 degrees about random axes; not inside their links."""
+    units = []
+    for k, unit in enumerate(skin.mounted):
+        for off, axis in np.random.default_rng([seed, 13, k]).standard_normal((20, 2, 3)):
+            T = unit.T_link_sensor.copy()
+            T[:3, 3] += 0.005 * off / np.linalg.norm(off)
+            turn = Rotation.from_rotvec(3.0 * axis / np.linalg.norm(axis), degrees=True)
+            T[:3, :3] = T[:3, :3] @ turn.as_matrix()
+            with suppress(SkinError):
+                units += Skin([replace(unit, T_link_sensor=T)], model).mounted
+                break
+    return Skin(units, model)
+
+
 def test_units_a_little_elsewhere_do_not_take_their_own_arm_for_an_obstacle(panda_model):
-    rng, placed_by_hand = np.random.default_rng(5), Misplacement(5.0, 3.0)
+    rng = np.random.default_rng(5)
     as_ours = PerceptionParams(self_aside_m=PROFILES["pretouch"].perception.self_aside_m)
     shown, readings = 0, 0
     for seed in range(15):
         truly = Skin([replace(u, sensor=PAPER_SENSOR) for u in skin_for(panda_model).mounted], panda_model)
-        believed = misplaced(truly, panda_model, placed_by_hand, seed)[0]
+        believed = placed_by_hand(truly, panda_model, seed)
         watcher = Watcher(panda_model, believed, no_fixtures(), as_ours)
         for now in range(1, 51):  # a second apart, so that nothing is remembered
             watcher.q = rng.uniform(panda_model.q_min, panda_model.q_max)

@@ -21,10 +21,10 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, skin_file, skin_for
 from pretouch.sim.paper_scenes import Placement, placement_for
 from pretouch.sim.plant_params import PlantParams, plant_params_of
-from pretouch.sim.randomisation import world_set
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import SceneSpec
 from pretouch.text_table import TextTable
+from pretouch_lab.domain_randomisation import world_set
 from pretouch_lab.options import TrialOptions
 from pretouch_lab.run import Play, Row, plays_of
 from pretouch_lab.trial import Record, Setup, Trace

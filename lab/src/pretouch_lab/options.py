@@ -82,7 +82,7 @@ class Playing:
     def input(self, name: str) -> str:
         """Return the name or absolute path of an arm, skin or world: a scheduler's workers run in another folder."""
         from pretouch.robot.description import ROBOTS
-        from pretouch.sim.randomisation import SETS
+        from pretouch_lab.domain_randomisation import SETS
 
         whole = self.scheduler and name and name not in (*ROBOTS, *SETS)
         return str(Path(name).absolute()) if whole else name

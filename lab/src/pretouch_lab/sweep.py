@@ -25,12 +25,11 @@ from pretouch.extras import Extra
 from pretouch.profiles import profile
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.randomisation import drawn, with_own
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.text_table import TextTable
 from pretouch_lab.bench.dense_skin import spread_skin
 from pretouch_lab.bench.scenes import SeedRange, model, plant_of, scenario
-from pretouch_lab.domain_randomisation import named_set
+from pretouch_lab.domain_randomisation import drawn, named_set, with_own
 from pretouch_lab.experiment import Context, experiment
 from pretouch_lab.options import SweepOptions
 from pretouch_lab.run import Play, Row

@@ -59,7 +59,7 @@ class Setup:
     recording: FilePath | None = None
     """File for the recording; None: no recording."""
     world: str = ""
-    """Set of the domain randomisation (`sim.randomisation`) that the seed draws from; empty: plant, ranging and skin
+    """Set of the domain randomisation (`domain_randomisation`) that the seed draws from; empty: plant, ranging and skin
     stay as given."""
     commander: Callable[[Plant, Hand | None], Callable[[], Desired | None]] | None = None
     """Returns a function that gives the desired motion of each step; None: the arm follows the path."""

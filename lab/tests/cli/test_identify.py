@@ -5,7 +5,7 @@ from lab.tests.identification.made import Made, free_motion
 from tests.imported_data.files import write_csv
 
 from pretouch import cli
-from pretouch.sim.randomisation import drawn, world_set
+from pretouch_lab.domain_randomisation import drawn, world_set
 
 
 @pytest.fixture(scope="module")

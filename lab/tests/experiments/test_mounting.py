@@ -6,8 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
-from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.scene import SceneSpec
+from pretouch_lab.domain_randomisation import Misplacement, misplaced
 from pretouch_lab.experiments import mounting
 from pretouch_lab.experiments.mounting import ROOM, tables
 from pretouch_lab.options import TrialOptions

@@ -16,7 +16,7 @@ from lab.tests.identification.made import (
 )
 
 from pretouch.errors import CalibrationError
-from pretouch.sim.randomisation import drawn, world_set
+from pretouch_lab.domain_randomisation import drawn, world_set
 from pretouch_lab.identification.arm_file import arm_toml
 from pretouch_lab.identification.fit import friction_parts
 from pretouch_lab.identification.identify import identify

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Literal
 
@@ -19,8 +19,6 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, skin_for
 from pretouch.signals import ended
 from pretouch.sim.paper_scenes import assumptions
-from pretouch.sim.random_skin import misplaced
-from pretouch.sim.randomisation import drawn, world_set
 from pretouch.units import EVERYWHERE
 from pretouch.units.keys import load_keys
 from pretouch.units.skin import NetworkSkin
@@ -38,9 +36,6 @@ class Live:
     """The paper's path that the arm follows."""
     seed: int = 0
     """Seed of the simulated arm: each has different errors and noise."""
-    world: OptionalFile = None
-    """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file, as `pretouch identify`
-    writes one, of which the seed draws its own; by default the usual ones."""
     record: OptionalFile = None
     """Recording to write from the start; the page can also start and stop recordings."""
     host: str = "127.0.0.1"
@@ -65,16 +60,11 @@ class Live:
 
         model = RobotModel(robot_named(self.arm))
         settings = settings_for(model, settings)
-        believed = skin = skin_for(model, self.skin)
-        if self.world:
-            world = drawn(world_set(str(self.world)), self.seed, settings.plant)
-            settings = replace(settings, plant=world.plant, ranging=world.ranging)
-            if not self.units.keys:
-                believed, _ = misplaced(skin, model, world.misplaced, self.seed)
+        skin = skin_for(model, self.skin)
         prepare(profile)
         Room(settings, live_path(settings), model, skin).tick()  # compiles what simulates
         with _units(self, skin) as real:
-            simulation = LiveSimulation(settings, model, believed, real, skin)
+            simulation = LiveSimulation(settings, model, skin, real)
             for sentence in assumptions(model, settings.placement):
                 print(sentence, flush=True)
                 simulation.notice = f"{simulation.notice} {sentence}".strip()

@@ -59,18 +59,15 @@ class LiveSimulation:
         model: RobotModel | None = None,
         skin: Skin | None = None,
         real: RealUnits | None = None,
-        true_skin: Skin | None = None,
     ) -> None:
         """Begin with the first control cycle done. Without others, the arm is a Panda with the paper's skin.
 
         Another arm needs `room.settings_for`.
 
-        With `real` units, they are what the skin's units read. Simulated ones sit where `true_skin` says, if it is
-        given, whatever the controller believes.
+        With `real` units, they are what the skin's units read.
         """
         self.model = model or RobotModel(panda())
         self.skin = skin or paper_skin(self.model)
-        self._true_skin = true_skin or self.skin
         self.real = real
         """The real units on the arm; None: it carries simulated ones."""
         self.recording: Recording | None = None
@@ -85,7 +82,7 @@ class LiveSimulation:
 
     def _begin(self, settings: LiveSettings) -> None:
         path = live_path(settings)
-        room = Room(settings, path, self.model, self._true_skin, self.real)
+        room = Room(settings, path, self.model, self.skin, self.real)
         self.notice = self.stop_recording() or self.notice
         self.settings = settings
         """Present settings, which a reset starts with."""
@@ -186,7 +183,7 @@ class LiveSimulation:
         """Begin again at time 0 with a scripted hand, which is a person's again as soon as it is moved."""
         self.reset()
         scale = self.settings.placement.scale
-        self.opening = Opening(self.model, self._true_skin, self.controller.path, scale, self.room.mouse.target)
+        self.opening = Opening(self.model, self.skin, self.controller.path, scale, self.room.mouse.target)
 
     def reset(self, **changes: Any) -> None:
         """Restart at time 0 with the present settings, but for changes of `LiveSettings`; ends a recording."""

@@ -16,12 +16,12 @@ from pretouch.sim.hand import PersonArm
 from pretouch.sim.paper_scenes import Placement, placement_for, static_path, static_scene
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams, plant_params_of
-from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.types import ControlStep
 from pretouch_lab.bench.obstacle import Ball, Cuboid, ShapeAt
 from pretouch_lab.bench.scenes import SeedRange, held, scenario, scenario_path, seed_of
+from pretouch_lab.domain_randomisation import Misplacement, misplaced
 from pretouch_lab.experiments.avoidance import Visit, Visitor, Walk
 from pretouch_lab.trial import Setup
 

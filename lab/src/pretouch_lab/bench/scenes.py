@@ -18,9 +18,9 @@ from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.types import FloatArray
+from pretouch_lab.domain_randomisation import Misplacement, misplaced
 
 FOLDER = Path(str(files("pretouch_lab.bench") / "scenarios"))
 CHECKSUMS = "CHECKSUMS"

@@ -16,7 +16,6 @@ from pretouch.realtime import check_wishes
 from pretouch.robot.description import files_digest, robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sim.plant_params import assumed_plant
-from pretouch.sim.randomisation import world_set
 from pretouch.text_table import TextTable
 from pretouch_lab import options as lab_options
 from pretouch_lab.bench import avoidance as avoiding
@@ -34,7 +33,7 @@ from pretouch_lab.bench.real_sets import sets_in
 from pretouch_lab.bench.scenes import checksums
 from pretouch_lab.bench.workload import LARGEST_SKIN
 from pretouch_lab.cli.playing import begin, played, report
-from pretouch_lab.domain_randomisation import folder_part, sentence
+from pretouch_lab.domain_randomisation import folder_part, sentence, world_set
 from pretouch_lab.run import Row, plays_of
 
 

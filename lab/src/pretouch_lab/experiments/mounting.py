@@ -4,10 +4,10 @@ from itertools import product
 
 from pretouch.profiles import profile
 from pretouch.sim.paper_scenes import static_path, static_scene
-from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.scene import SceneSpec
 from pretouch.text_table import TextTable
 from pretouch_lab.bench.scenes import path_of
+from pretouch_lab.domain_randomisation import Misplacement, misplaced
 from pretouch_lab.experiment import Context, Experiment, controllers
 from pretouch_lab.experiments import static
 from pretouch_lab.options import TrialOptions

@@ -1,4 +1,4 @@
-"""An identified arm as a world file in TOML for simulations (`sim.randomisation`), and as a figure."""
+"""An identified arm as a world file in TOML for simulations (`domain_randomisation`), and as a figure."""
 
 from collections.abc import Iterable
 

@@ -1,13 +1,17 @@
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from pretouch.errors import ParameterError
 from pretouch.robot.description import panda
+from pretouch.robot.model import RobotModel
+from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams, plant_params_of
-from pretouch.sim.random_skin import Misplacement
-from pretouch.sim.randomisation import SETS, DrawnWorld, drawn, with_own, world_set
 from pretouch.sim.range_finder import RangeFinderParams
+from pretouch.sim.scene import SceneSpec
+from pretouch_lab.domain_randomisation import SETS, DrawnWorld, Misplacement, drawn, with_own, world_set
 
 
 def test_the_nominal_world_is_the_usual_one():
@@ -92,3 +96,13 @@ def test_a_file_that_is_wrong_is_refused_with_the_field(tmp_path, text, said):
 def test_a_name_that_is_none_says_which_there_are():
     with pytest.raises(ParameterError, match="not one of nominal, realistic, stress"):
         world_set("real")
+
+
+def test_every_arm_of_the_hard_world_moves_without_coming_apart(panda_model: RobotModel):
+    for seed in range(1000, 1004):
+        params = drawn(world_set("hard"), seed).plant
+        arm = Plant(panda_model, SceneSpec(), params, panda_model.description.q_ready, seed)
+        arm.command(np.full(7, 0.2))
+        states = [arm.read() for _ in range(100) if arm.advance(0.01) is None]
+        assert_allclose(states[-1].q - states[0].q, 0.2, atol=0.05)
+        assert max(np.abs(state.tau_ext).max() for state in states) < 40.0
