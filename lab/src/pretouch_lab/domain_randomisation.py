@@ -6,6 +6,7 @@ A set, a world file, says of some fields of arm, range finders and places of uni
 import math
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from hashlib import sha256
@@ -33,49 +34,33 @@ class Misplacement:
 
     position_mm: float = 0.0
     orientation_deg: float = 0.0
-    declared: bool = False
-    """True if the skin file declares the error as standard deviations."""
 
 
-def misplaced(skin: Skin, model: RobotModel, error: Misplacement, seed: int) -> tuple[Skin, int]:
-    """Return what the controller believes of a skin, and how many drawn poses no skin file could hold.
+def misplaced(skin: Skin, model: RobotModel, error: Misplacement, seed: int) -> Skin:
+    """Return what the controller believes of a skin.
 
     Each unit's position is off in a random direction, its orientation about a random axis, both uniform on the sphere:
     a turn about the beam changes nothing, and the beam itself tilts by 0.79 of the angle on average. Direction and axis
     depend on the seed and the unit, not on the error's size. A pose that `Skin` refuses, inside the unit's own link, is
     drawn again.
     """
-    believed = [
-        _believed(unit, model, error, np.random.default_rng([seed, 13, k])) for k, unit in enumerate(skin.mounted)
-    ]
-    units = [unit for unit, _ in believed]
-    if error.declared:  # along, and about, one axis of an error that may point anywhere
-        position, turn = (
-            error.position_mm / 1000 / np.sqrt(3.0),
-            float(np.radians(error.orientation_deg)) / np.sqrt(3.0),
-        )
-        units = [replace(unit, position_sigma=position, orientation_sigma=turn) for unit in units]
-    return Skin(units, model), sum(refused for _, refused in believed)
+    rngs = (np.random.default_rng([seed, 13, k]) for k in range(len(skin.mounted)))
+    return Skin([_believed(unit, model, error, rng) for unit, rng in zip(skin.mounted, rngs, strict=True)], model)
 
 
-def _believed(
-    unit: SensorUnit, model: RobotModel, error: Misplacement, rng: np.random.Generator
-) -> tuple[SensorUnit, int]:
+def _believed(unit: SensorUnit, model: RobotModel, error: Misplacement, rng: np.random.Generator) -> SensorUnit:
     from scipy.spatial.transform import Rotation  # a fifth of a second, and few skins are misplaced
 
-    T, refused = unit.T_link_sensor.copy(), 0
+    T = unit.T_link_sensor.copy()
     while True:
         off, axis = (v / np.linalg.norm(v) for v in rng.standard_normal((2, 3)))
         T[:3, 3] = unit.T_link_sensor[:3, 3] + error.position_mm / 1000 * off
         turn = Rotation.from_rotvec(error.orientation_deg * axis, degrees=True)
         T[:3, :3] = unit.T_link_sensor[:3, :3] @ turn.as_matrix()
         believed = replace(unit, T_link_sensor=T)
-        try:
+        with suppress(SkinError):
             Skin([believed], model)
-        except SkinError:
-            refused += 1
-        else:
-            return believed, refused
+            return believed
 
 
 FOLDER = Path(__file__).parent / "worlds"
@@ -250,7 +235,7 @@ def randomised(name: str, seed: int, model: RobotModel, parts: Parts) -> Parts:
     world = drawn(named_set(name), seed, usual)
     believed, off = parts.believed, world.misplaced
     if believed is None and off != Misplacement() and len(parts.skin):
-        believed = misplaced(parts.skin, model, off, seed)[0]
+        believed = misplaced(parts.skin, model, off, seed)
     plant, ranging = parts.plant, with_own(world.ranging, parts.ranging, RangeFinderParams())
     return Parts(with_own(world.plant, plant, usual), ranging, parts.skin, believed)
 

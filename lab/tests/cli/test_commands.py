@@ -32,7 +32,6 @@ def run(capsys, *args):
             "reproduce static --out OUT --json OUT",
             "out is in .*out, where the run keeps its own: give a name that ends in .json",
         ),
-        ("reproduce two-arms --profiles blind", "The experiment two-arms needs a profile that senses proximity"),
         ("reproduce between --arm fr3", "'between' is laid out for the Panda: with --arm, choose static, avoidance"),
         ("demo --seeds 0", "The number of seeds is 0: give at least 1"),
         ("figure square", "The figure 'square' is unknown: choose from force-difference, circle"),

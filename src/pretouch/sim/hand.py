@@ -66,11 +66,11 @@ class Hand:
         self._plant, self._script = plant, script
         body = plant.mj_model.body("hand")
         dof, data = int(plant.mj_model.body_dofadr[body.id]), plant.mj_data
-        own, links = slice(dof, dof + 3), slice(plant.first_body, None)
+        own = slice(dof, dof + 3)
         places, numbers = np.zeros((5, 3)), np.array([0.0, 0.0, 0.0, 0.0, *arm])
         places[AT_HOME] = places[END] = body.pos
         # views into the simulation's memory, taken once
-        views = data.qpos[own], data.qvel[own], data.qfrc_applied[own], data.xpos[links], data.xmat[links]
+        views = data.qpos[own], data.qvel[own], data.qfrc_applied[own], data.xpos, data.xmat
         self._memory = plant.hand = HandMemory(*views, places, numbers)
         plant.before_each_step(self._drive)
 

@@ -32,11 +32,11 @@ class Touch(NamedTuple):
     link: int
     """Index of the link that touches."""
     velocity: FloatArray
-    """(3,) velocity of the touching point of the link before the contact [m/s], the arm's own base frame."""
+    """(3,) velocity of the touching point of the link before the contact [m/s], base frame."""
 
 
 class PointForce(NamedTuple):
-    """A force on the arm at a point of it, frame of the world."""
+    """A force on the arm at a point of it, base frame."""
 
     link: int
     """Index of the link it acts on."""
@@ -46,23 +46,17 @@ class PointForce(NamedTuple):
     """(3,) on the arm [N]."""
 
 
-class ArmInWorld:
-    """One arm of a kind in a MuJoCo world: the port `Robot`.
+class Plant:
+    """A simulated arm in a MuJoCo world, and the time in it: the port `Robot`.
 
     The control law and the observer use the nominal model and what the sensors say; the physics has other masses,
-    a payload, joint friction, and contacts. What a real arm's owner cannot know is under `true_...`. Where nothing
-    else is said, vectors are in the world's frame, which is the base frame of the arm that the world was built of.
+    a payload, joint friction, and contacts. What a real arm's owner cannot know is under `true_...`.
     """
 
-    mj_model: mujoco.MjModel
-    mj_data: mujoco.MjData
-    time: float
-    """[s]"""
-
-    def __init__(self, model: RobotModel, params: PlantParams, seed: int) -> None:
-        """Draw an arm: the seed decides its errors and its noise."""
+    def __init__(self, model: RobotModel, scene: SceneSpec, params: PlantParams, q: FloatArray, seed: int) -> None:
+        """Build an arm at rest at q (n,) [rad]; the seed decides its errors and its noise."""
         params.check_joints(model.n, len(model.links))
-        self.model, self.params, self._n = model, params, model.n
+        self.model, self.scene, self.params, self._n = model, scene, params, model.n
         rng = np.random.default_rng([seed, 1])
         self._rng, self._wander = np.random.default_rng([seed, 2]), np.random.default_rng([seed, 3])
         self._drift = np.zeros(model.n)
@@ -71,37 +65,33 @@ class ArmInWorld:
         self.error = ArmError(params, mass_factor, payload if params.payload_kg is None else params.payload_kg)
         self.offset_nm = _known(params.offsets_nm, np.array(params.torque_offset_nm) * rng.uniform(-1, 1, self._n))
         """Errors (n,) of the torque sensors that stay [Nm], which a real arm's owner cannot know."""
-        self._ripple_phase = _known(params.ripple_phases_rad, rng.uniform(0, 2 * np.pi, self._n))
+        ripple_phase = _known(params.ripple_phases_rad, rng.uniform(0, 2 * np.pi, self._n))
+        self._before_step: list[Callable[[float], float | None]] = []
+        self._idle_until: list[float] = []
+        self._ready: Callable[[], Ranging] | None = None
+        self._chance: np.random.Generator | None = None
+        self.time = 0.0
+        """[s]"""
+        self.mj_model, none = build(model, scene, self.error), np.empty(0)
+        self.mj_data = mujoco.MjData(self.mj_model)
+        self.hand = HandMemory(none, none, none, np.empty((0, 3)), np.empty((0, 9)), np.empty((0, 3)), none)
+        """A person's hand; none yet."""
+        self._begin(q, ripple_phase)
 
-    def before_each_step(self, call: Callable[[float], float | None]) -> None:
-        """Have `call(time)` run before each physics step: hands and sensors are driven so.
-
-        It may return until when it has nothing to do, if nothing touches before [s]. While nobody has, steps are taken
-        in one go.
-        """
-        raise NotImplementedError
-
-    def measure_each_step(self, ready: Callable[[], Ranging], rng: np.random.Generator) -> bool:
-        """Have compiled code measure before each physics step with what `ready()` returns; say whether it will."""
-        return False
-
-    def _enter(self, mj_model: mujoco.MjModel, mj_data: mujoco.MjData, joint: int, body: int, q: FloatArray) -> None:
-        """Take the place of the arm whose first joint and world link have these indices; it is at q (n,) [rad]."""
-        self.mj_model, self.mj_data, self.first_body = mj_model, mj_data, body
-        """`first_body` is the index in MuJoCo's of what is link 0 of the arm: its links follow."""
+    def _begin(self, q: FloatArray, ripple_phase: FloatArray) -> None:
+        """Let the arm stand at q (n,) [rad], with the phases (n,) of its joints' ripple [rad]."""
+        mj_model, mj_data, own = self.mj_model, self.mj_data, slice(0, self._n)
         moving = np.flatnonzero(self.model.moved_by.any(axis=1))
-        self._geom_link = mj_model.geom_bodyid - body
+        self._geom_link = np.where(np.isin(mj_model.geom_bodyid, moving), mj_model.geom_bodyid, -1)
         """Link of each geom, -1 for other objects."""
-        self._geom_link[~np.isin(self._geom_link, moving)] = -1
         # views into the simulation's memory, taken once: MuJoCo's attribute look-ups cost as much as the arithmetic
-        self.link_position, self.link_rotation = mj_data.xpos[body:], mj_data.xmat.reshape(-1, 3, 3)[body:]
+        self.link_position, self.link_rotation = mj_data.xpos, mj_data.xmat.reshape(-1, 3, 3)
         """(L', 3) origins [m] and (L', 3, 3) orientations of the links, then of whatever else moves."""
-        own = slice(joint, joint + self._n)
         mj_data.qpos[own] = q
         mujoco.mj_forward(mj_model, mj_data)
         self.stiffness = np.array(self.params.stiffness_nm_rad)
         """Stiffness of the joint impedance (n,) [Nm/rad]; `set_stiffness` changes it."""
-        self._arm = memory_of(mj_model, mj_data, own, self.model, self.params, self._ripple_phase)
+        self._arm = memory_of(mj_model, mj_data, own, self.model, self.params, ripple_phase)
         self._arm.impedance[:2], self._arm.offset[:] = self._spring_and_damper(self._arm.mass_matrix), self.offset_nm
         # what is added to coloured noise at each step, so that its variance stays that of the sensor
         torque_noise = np.array(self.params.torque_noise_nm) * np.sqrt(1 - self._arm.keep**2)
@@ -190,7 +180,7 @@ class ArmInWorld:
         if self.true_force is not _NO_FORCE and not (touched and len(times) == 1):
             _, contact, link, _ = next(self._on_the_arm())
             kin = self.model.kinematics(self._arm.world.q)
-            jacobian = self.model.jacobian(kin, link, self._in_base(contact.pos.copy()))
+            jacobian = self.model.jacobian(kin, link, contact.pos.copy())
             self.touches.append(Touch(self.time, link, jacobian[:3] @ self._arm.state[QD_BEFORE]))
 
     def _age(self, duration: float) -> None:
@@ -202,10 +192,6 @@ class ArmInWorld:
             drawn = p.drift_nm * np.sqrt(1.0 - keep**2) * self._wander.standard_normal(self._n)
             self._drift = keep * self._drift + drawn
             self._err[:] = self.offset_nm + self._drift
-
-    def _in_base(self, point: FloatArray) -> FloatArray:
-        """Return a point (3,) of the world in the arm's own base frame [m]."""
-        return point
 
     def contact_forces(self) -> list[PointForce]:
         """Return the forces of all contacts of the arm with anything else, at the last physics step."""
@@ -225,31 +211,20 @@ class ArmInWorld:
                     yield number, contact, link, sign
                     break
 
-
-class Plant(ArmInWorld):
-    """The arm that a scene is built round, and the time in it."""
-
-    def __init__(self, model: RobotModel, scene: SceneSpec, params: PlantParams, q: FloatArray, seed: int) -> None:
-        """Build an arm at rest at q (n,) [rad]; the seed decides its errors and its noise."""
-        super().__init__(model, params, seed)
-        self.scene = scene
-        self._before_step: list[Callable[[float], float | None]] = []
-        self._idle_until: list[float] = []
-        self._ready: Callable[[], Ranging] | None = None
-        self._chance: np.random.Generator | None = None
-        self.time = 0.0
-        built, none = build(model, scene, self.error), np.empty(0)
-        self.hand = HandMemory(none, none, none, np.empty((0, 3)), np.empty((0, 9)), np.empty((0, 3)), none)
-        """A person's hand; none yet."""
-        self._enter(built, mujoco.MjData(built), 0, 0, q)
-
     def before_each_step(self, call: Callable[[float], float | None]) -> None:
-        """Have `call(time)` run before each physics step, as `ArmInWorld` says."""
+        """Have `call(time)` run before each physics step: hands and sensors are driven so.
+
+        It may return until when it has nothing to do, if nothing touches before [s]. While nobody has, steps are taken
+        in one go.
+        """
         self._before_step.append(call)
         self._idle_until.append(-np.inf)
 
     def measure_each_step(self, ready: Callable[[], Ranging], rng: np.random.Generator) -> bool:
-        """Do so for the first to ask."""
+        """Have compiled code measure before each physics step with what `ready()` returns, for the first to ask.
+
+        Return whether it will.
+        """
         if self._ready is not None:
             return False
         self._ready, self._chance = ready, rng

@@ -11,7 +11,7 @@ from pretouch.sensing.sensor import Capacitive, Sensor, cone_rays
 from pretouch.sensing.skin import Skin
 from pretouch.sim.capacitive import STREAM, Electrode
 from pretouch.sim.flaws import flaw_arrays, flaws_of
-from pretouch.sim.plant import ArmInWorld
+from pretouch.sim.plant import Plant
 from pretouch.sim.rays import Finders, Ranging, deliver, geoms_of, measure
 from pretouch.sim.under_way import ROUNDING_S
 from pretouch.types import RangeReadings, RangeStatus
@@ -89,7 +89,7 @@ class RangeFinders:
     """
 
     def __init__(
-        self, plant: ArmInWorld, skin: Skin, params: RangeFinderParams, seed: int, send: Send | None = None
+        self, plant: Plant, skin: Skin, params: RangeFinderParams, seed: int, send: Send | None = None
     ) -> None:
         """Mount the sensors on a simulated arm; the seed decides offsets, phases, noise and losses.
 
@@ -104,7 +104,7 @@ class RangeFinders:
         flaws = [flaws_of(unit.sensor) if params.realistic else None for unit in skin.units]
         offset = np.array([one.offset_max_m if one else params.offset_max_m for one in flaws])
         offset *= self._rng.uniform(-1, 1, count)
-        bodies, geoms = plant.first_body + skin.link, geoms_of(plant.mj_model, data)
+        bodies, geoms = skin.link, geoms_of(plant.mj_model, data)
         # a flat wall square to the beam is read at its distance, as by a calibrated sensor: rays at an angle meet it
         # farther away by 1 / cos, and with strength cos^3, which is slant, and the distance squared
         flat_wall = (cones[:, :, 2] ** 3).sum(axis=1) / (cones[:, :, 2] ** 2).sum(axis=1)

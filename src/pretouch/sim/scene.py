@@ -14,8 +14,6 @@ from pretouch.types import FloatArray
 
 CONTACTS = "contacts"
 """Name of the sensor that counts the contacts of a scene."""
-ARM_STIFFNESS = 100_000.0
-"""Stiffness of two arms' contacts with each other, stiff covers on both [N/m]; an assumption."""
 _IMPEDANCE = 0.01
 """Constant solver impedance d of all contacts; with it and an elliptic cone solref means N/m, see `stiffen`."""
 
@@ -58,38 +56,12 @@ class GhostSpec:
 
 
 @dataclass(frozen=True)
-class BasePose:
-    """Position of an arm, upright, in the base frame of another."""
-
-    position: tuple[float, float, float]
-    """[m]"""
-    yaw: float
-    """About z [rad]."""
-
-    @property
-    def T(self) -> FloatArray:
-        """Pose (4, 4) of its base in the base frame of the other."""
-        (x, y, z), c, s = self.position, float(np.cos(self.yaw)), float(np.sin(self.yaw))
-        return np.array([[c, -s, 0.0, x], [s, c, 0.0, y], [0.0, 0.0, 1.0, z], [0.0, 0.0, 0.0, 1.0]])
-
-
-@dataclass(frozen=True)
-class SecondArmSpec:
-    """Another arm in the scene, on a pedestal of the same kind, which a simulation of its own moves."""
-
-    model: RobotModel
-    base: BasePose
-    error: "ArmError"
-
-
-@dataclass(frozen=True)
 class SceneSpec:
     """Objects to build round the arm."""
 
     boxes: tuple[Box, ...] = ()
     hand: HandSpec | None = None
     ghost: GhostSpec | None = None
-    second: SecondArmSpec | None = None
     floor_height: float = -0.2
     """Height of the floor in the base frame [m]: the arm stands on a pedestal, or its hand would reach below it."""
     pedestal_radius: float = 0.1
@@ -133,33 +105,28 @@ class ArmError:
 def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel:
     """Build the MuJoCo model of a scene. Only declared pairs touch, and what a world's file lets touch.
 
-    Each moving capsule touches floor, boxes and hand, and those of a second arm; the hand also touches all that stands
-    still, but in a world.
+    Each moving capsule touches floor, boxes and hand; the hand also touches all that stands still, but in a world.
     """
     mj, moving, still = _arm(model, error)
     mj.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    moving_2, still_2 = ([], []) if spec.second is None else _add_second(mj, spec, spec.second)
-    if spec.world:  # behind the arms, whose joints are found by their numbers
+    if spec.world:  # behind the arm, whose joints are found by their numbers
         attach_world(mj, spec.world)
     else:
         still.append("pedestal")
     stiffness = _add_objects(mj, spec)
-    pairs = [(link, thing) for link in moving + moving_2 for thing in stiffness]
-    pairs += [(link, other) for link in moving for other in moving_2 + still_2]
-    pairs += [(thing, link) for thing in still for link in moving_2]
+    pairs = [(link, thing) for link in moving for thing in stiffness]
     if spec.hand:
-        pairs += [(thing, "hand") for thing in [*still, *still_2, *stiffness] if thing != "hand"]
+        pairs += [(thing, "hand") for thing in [*still, *stiffness] if thing != "hand"]
     friction, impedance = [0.5, 0.5, 0.005, 0.0001, 0.0001], [_IMPEDANCE, _IMPEDANCE, 0.001, 0.5, 2.0]
     for one, other in pairs:
         mj.add_pair(geomname1=one, geomname2=other, condim=3, friction=friction, solimp=impedance)
     found_flag = 1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND)
     mj.add_sensor(name=CONTACTS, type=mujoco.mjtSensor.mjSENS_CONTACT, intprm=[found_flag, 0, 1])
-    built = mj.compile()
-    _err(built, 0, error.mass_factor)
-    if spec.second:
-        _err(built, body_before_second(built), spec.second.error.mass_factor)
+    built, links = mj.compile(), slice(1, len(error.mass_factor))
+    built.body_mass[links] *= error.mass_factor[1:]
+    built.body_inertia[links] *= error.mass_factor[1:, None]
     mujoco.mj_setConst(built, mujoco.MjData(built))
-    for thing, of_it in (dict.fromkeys(moving_2 + still_2, ARM_STIFFNESS) | stiffness).items():
+    for thing, of_it in stiffness.items():
         stiffen(built, thing, of_it, spec.damping_ratio)
     return built
 
@@ -181,40 +148,6 @@ def _arm(model: RobotModel, error: ArmError) -> tuple[mujoco.MjSpec, list[str], 
     if error.params.cable_n_m:
         _add_cable(mj, model, error.params)
     return mj, moving, still
-
-
-def _err(built: mujoco.MjModel, world: int, mass_factor: FloatArray) -> None:
-    """Give the links of the arm whose link 0 has the index `world` other masses."""
-    links = slice(world + 1, world + len(mass_factor))
-    built.body_mass[links] *= mass_factor[1:]
-    built.body_inertia[links] *= mass_factor[1:, None]
-
-
-def _add_second(mj: mujoco.MjSpec, spec: SceneSpec, second: SecondArmSpec) -> tuple[list[str], list[str]]:
-    """Stand another arm in the scene, on its pedestal; return the names of its geoms that move, and that do not."""
-    arm, moving, still = _arm(second.model, second.error)
-    x, y, z = second.base.position
-    half = second.base.yaw / 2
-    frame = mj.worldbody.add_frame(pos=[x, y, z], quat=[np.cos(half), 0.0, 0.0, np.sin(half)])
-    mj.attach(arm, prefix=_SECOND, frame=frame)
-    _add_pedestal(mj, f"{_SECOND}pedestal", spec, (x, y, z))
-    return [_SECOND + name for name in moving], [_SECOND + name for name in [*still, "pedestal"]]
-
-
-_SECOND = "second_"
-"""Begins the names of all that belongs to the second arm."""
-
-
-def body_before_second(built: mujoco.MjModel) -> int:
-    """Return the index of the body before the second arm's first: its links follow, as those of an arm the world."""
-    return next(i for i in range(built.nbody) if built.body(i).name.startswith(_SECOND)) - 1
-
-
-def _add_pedestal(mj: mujoco.MjSpec, name: str, spec: SceneSpec, at: tuple[float, float, float]) -> None:
-    x, y, z = at
-    axis, size = [x, y, spec.floor_height, x, y, z - spec.pedestal_radius], [spec.pedestal_radius, 0, 0]
-    capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
-    mj.worldbody.add_geom(name=name, type=capsule, fromto=axis, size=size, contype=0, conaffinity=0)
 
 
 def _add_cable(mj: mujoco.MjSpec, model: RobotModel, params: PlantParams) -> None:
@@ -241,7 +174,8 @@ def _add_objects(mj: mujoco.MjSpec, spec: SceneSpec) -> dict[str, float]:
     stiffness: dict[str, float] = {}
     if not spec.world:
         world.add_geom(name="floor", type=kind.mjGEOM_PLANE, size=[3, 3, 0.1], pos=[0, 0, spec.floor_height], **off)
-        _add_pedestal(mj, "pedestal", spec, (0, 0, 0))
+        axis, size = [0, 0, spec.floor_height, 0, 0, -spec.pedestal_radius], [spec.pedestal_radius, 0, 0]
+        world.add_geom(name="pedestal", type=kind.mjGEOM_CAPSULE, fromto=axis, size=size, **off)
         stiffness["floor"] = 100_000.0
     for thing in spec.boxes:
         world.add_geom(name=thing.name, type=kind.mjGEOM_BOX, size=thing.half_size, pos=thing.center, **off)

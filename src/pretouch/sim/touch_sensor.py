@@ -9,7 +9,7 @@ import numpy as np
 from pretouch.checks import Checked, Fraction, NonNegative, Positive
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
-from pretouch.sim.plant import ArmInWorld, PointForce
+from pretouch.sim.plant import Plant, PointForce
 from pretouch.sim.under_way import ROUNDING_S, UnderWay
 from pretouch.types import RangeReadings, TouchReadings, TouchStatus
 
@@ -80,7 +80,7 @@ class TouchSensors:
     """
 
     def __init__(
-        self, plant: ArmInWorld, skin: Skin, params: TouchErrors, seed: int, laid: Forces = no_forces, send: Send = None
+        self, plant: Plant, skin: Skin, params: TouchErrors, seed: int, laid: Forces = no_forces, send: Send = None
     ) -> None:
         """Mount the sensors on a simulated arm; the seed decides their errors, phases, noise and losses.
 

@@ -141,7 +141,7 @@ def sensing_of(name: str, seed: int, skin: Skin | None = None) -> Sensing:
     kind, radius = values.pop("skin"), values.pop("hand_radius")
     error = Misplacement(values.pop("position_mm", 0.0), values.pop("orientation_deg", 0.0))
     units = skin or (paper_skin(model()) if kind == "seven" else load_skin(scenario_path("dense_skin.toml"), model()))
-    believed = units if error == Misplacement() else misplaced(units, model(), error, seed)[0]
+    believed = units if error == Misplacement() else misplaced(units, model(), error, seed)
     return Sensing(units, believed, RangeFinderParams(**values), radius)
 
 

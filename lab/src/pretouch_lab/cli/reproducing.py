@@ -27,8 +27,8 @@ _DEMONSTRATED = ("blind", "paper", "pretouch")
 _PROFILES = (*TrialOptions.profiles, "slowing-only", "thresholds-only", "paper-0.5m")
 _STIFFNESS = (2_000.0, 25_000.0, 75_000.0, 300_000.0)
 _MODES = ("hard", "slack", "floor")
-_STUDIES = {"between": 12, "mounting": 6, "two-arms": 3}
-"""Studies beside the paper's experiments, each with its number of seeds."""
+_CLOSE_UPS = 12
+"""Most seeds of the experiment `between`."""
 _ENDINGS = (".png", ".pdf", ".svg")
 Part = tuple[str, str, TrialOptions]
 """Name of a folder, an experiment, and the options of its trials in the folder."""
@@ -53,8 +53,8 @@ def new_folder(name: str) -> Path:
 def whole_paper(options: TrialOptions) -> list[Part]:
     """Return all parts of `pretouch reproduce all`.
 
-    A study has at most the seeds of `options`, and at most its own number. Other profiles and stiffnesses than the
-    defaults replace those of the paper's three experiments; the defaults are extended by further values.
+    Other profiles and stiffnesses than the defaults replace those of the paper's three experiments; the defaults are
+    extended by further values.
     """
     check(options, NAMES)
     profiles = _PROFILES if options.profiles == TrialOptions.profiles else options.profiles
@@ -64,8 +64,9 @@ def whole_paper(options: TrialOptions) -> list[Part]:
     parts += [(name, name, whole) for name in ("avoidance", "dynamic")]
     if not options.restrictions and "paper" in profiles:
         parts.append(("restrictions", "static", replace(options, profiles=("paper",), restrictions=_MODES)))
-    study = TrialOptions(skin=options.skin, world=options.world, first_seed=options.first_seed)
-    return parts + [(name, name, replace(study, seeds=min(options.seeds, n))) for name, n in _STUDIES.items()]
+    seeds = min(options.seeds, _CLOSE_UPS)
+    close_up = TrialOptions(seeds, options.first_seed, skin=options.skin, world=options.world)
+    return [*parts, ("between", "between", close_up)]
 
 
 def compared(name: str, options: TrialOptions) -> list[Part]:
