@@ -19,13 +19,13 @@ from pretouch.profiles import Profile, profile
 from pretouch.robot.description import files_digest, robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, skin_file, skin_for
-from pretouch.sim.paper_scenes import Placement, placement_for
 from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import SceneSpec
 from pretouch.text_table import TextTable
 from pretouch_lab.domain_randomisation import world_set
 from pretouch_lab.options import TrialOptions
+from pretouch_lab.placement import PeoplePlacement, people_placement
 from pretouch_lab.run import Play, Row, plays_of
 from pretouch_lab.trial import Record, Setup, Trace
 
@@ -67,7 +67,7 @@ class Context:
 
     model: RobotModel
     skin: Skin
-    placement: Placement = field(default_factory=Placement)
+    placement: PeoplePlacement = field(default_factory=PeoplePlacement)
     """Places of the paper's paths and objects, scaled to this arm."""
     world: str = ""
     """Set of the domain randomisation that each trial's seed draws from; empty: none."""
@@ -180,7 +180,7 @@ def check(options: TrialOptions, names: Sequence[str]) -> None:
 def context_of(arm: str, skin: str, world: str, name: str = "paper") -> Context:
     """Load the context of all trials with the profile of a name, once in each process."""
     model, paper = RobotModel(robot_named(arm or "panda")), profile(name).sight.memory is None
-    return Context(model, skin_for(model, skin, paper=paper), placement_for(model), world)
+    return Context(model, skin_for(model, skin, paper=paper), people_placement(model), world)
 
 
 def arguments(name: str, options: TrialOptions) -> Row:

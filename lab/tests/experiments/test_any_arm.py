@@ -20,6 +20,7 @@ from pretouch_lab.bench.avoidance import trial
 from pretouch_lab.bench.avoidance_scenes import scenarios, setting
 from pretouch_lab.experiment import Context, context_of
 from pretouch_lab.experiments import avoidance, dynamic
+from pretouch_lab.placement import people_placement
 
 STRONG = '<limit lower="-2.8" upper="2.8" velocity="2" effort="120"/>'
 """Limits of joints that hold such an arm outstretched."""
@@ -47,7 +48,7 @@ def others(folder) -> Context:
 
 def test_the_rule_finds_the_papers_places_and_about_the_hand_of_a_panda_that_it_does_not_know(stranger, panda_model):
     model = RobotModel(stranger)
-    places = placement_for(model)
+    places = people_placement(model)
     assert places.scale == 1.0
     assert places.beside == pytest.approx((0.43, 0.43), abs=0.03)
     assert places.inside == pytest.approx((0.35, 0.35), abs=0.03)

@@ -3,7 +3,6 @@ import pytest
 from tests.limits import assert_within_limits
 
 from pretouch.errors import ExperimentError
-from pretouch.sim.paper_scenes import Placement
 from pretouch_lab.experiments import avoidance
 from pretouch_lab.options import TrialOptions
 
@@ -52,7 +51,7 @@ def test_at_the_line_a_hand_is_held_on_it_or_before_it_and_comes_from_the_front(
 
 def test_a_walker_stays_beside_the_path_and_comes_back_without_running():
     for seed in range(20):
-        way = avoidance.walk(seed, Placement())
+        way = avoidance.walk(seed, avoidance.UNMOVED)
         near = np.abs(way.places[:, 1]) <= 0.7
         assert near.tolist() == [True, True, False, False, *[True] * 4, False, False, True, True, False]
         # a ball of 0.15 m beside a circle of 0.25 m

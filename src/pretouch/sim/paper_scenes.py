@@ -3,7 +3,7 @@
 And how paths, board and person are brought into the reach of another arm than a Panda.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -12,7 +12,7 @@ from pretouch.control.path import Circle, Path, segment
 from pretouch.errors import ExperimentError, PathError
 from pretouch.robot.description import is_shipped
 from pretouch.robot.model import RobotModel
-from pretouch.robot.postures import brought_to, capsule_ends, kinematics_of, segment_distance, self_distances
+from pretouch.robot.postures import brought_to, capsule_ends, kinematics_of, self_distances
 from pretouch.sim.hand import FACES, Push, against
 from pretouch.sim.plant_params import assumed_plant
 from pretouch.sim.scene import Box, SceneSpec
@@ -69,8 +69,6 @@ def board_beside(
 
 _LINE_END_Y, _LINE_X, _LINE_Z = 0.5, 0.4, 0.5
 _CENTER, _RADIUS_M = (0.5, 0.0, 0.25), 0.25
-_VISITED_ABOVE_M = 0.05
-"""Height of a visiting person's hand above the circle's centre, of the Panda's circle [m]."""
 _FACE_SPREAD_M = 0.05
 """The seed moves the board's face by up to this [m]."""
 _CENTER_SPREAD_M = 0.02
@@ -89,11 +87,6 @@ class Placement:
     """Side of the hand that meets a board at +y."""
     right: HandSide = PANDA_SIDE
     """Side of the hand that meets a board at -y."""
-    beside: tuple[float, float] = (0.43, 0.43)
-    """Distance of a person's hand beside the circle from the plane y = 0, at -y and at +y [m]: the Panda's hand,
-    whose side comes to 0.35 m, passes it by 3 cm."""
-    inside: tuple[float, float] = (0.35, 0.35)
-    """The same of a hand half of which is in the way."""
 
     def point(self, x: float, y: float, z: float) -> tuple[float, float, float]:
         """Return where a point of the paper is for this arm [m]."""
@@ -115,40 +108,11 @@ class Placement:
         """Return the distance of a board's face from the plane y = 0 [m] at which it is met where the paper's is."""
         return self.scale * face + (self.hand(side).aside - self.scale * PANDA_SIDE.aside)
 
-    def moved(self, x: float, y: float, z: float) -> tuple[float, float, float]:
-        """Return where what stands at a point of the paper's room is for this arm [m].
-
-        Within the circle's width it is scaled with it, beyond it keeps its distance from it.
-        """
-        if self == _UNMOVED:
-            return x, y, z
-        inner = min(abs(y), _RADIUS_M)
-        aside = float(np.copysign(self.scale * inner + abs(y) - inner, y))
-        return self.scale * x, aside, self.scale * z
-
-    def visited(self, place: str, sign: float) -> tuple[float, float, float]:
-        """Return where a person's hand is held `beside` the circle or `inside` it, on the side `sign` (1: +y) [m]."""
-        x, _, z = self.point(*_CENTER)
-        aside = (self.beside if place == "beside" else self.inside)[int(sign > 0)]
-        above = self.hand("+y" if sign > 0 else "-y").above - PANDA_SIDE.above
-        return x, sign * aside, z + above + _VISITED_ABOVE_M
-
     def paths_sentence(self, arm: str) -> str:
         """Say what was done to the paper's paths."""
         return (
             f"The paper's paths for {arm}: {self.scale:.3g} times as large and as far from the base; the board is met"
             " on the same part of them."
-        )
-
-    def sentence(self, arm: str) -> str:
-        """Say what was done to the paper's paths and places."""
-        if self == _UNMOVED:
-            return f"{arm} has the paper's own paths and places."
-        places = [f"{a:.2f} and {b:.2f} m" for a, b in (self.beside, self.inside)]
-        return (
-            f"{self.paths_sentence(arm)} A person's hand beside the circle is {places[0]} from the plane y = 0 (at -y"
-            f" and at +y), one in the way {places[1]}, where the free arm passes 3 cm from the one and through the"
-            " middle of the other."
         )
 
 
@@ -188,10 +152,6 @@ _SINGULAR, _LIMIT_RAD, _CLEAR_M = 0.05, 0.05, 0.01
 """Bounds all along a path: smallest singular value, distance from joint limits, and from itself."""
 _HELD = 0.8
 """Largest part of a joint's torque that may go into holding the arm: what is left has to move it."""
-_BESIDE_M, _INSIDE_M = 0.078, 0.0
-"""How far the centre of a person's hand is from the arm where it is nearest: as the Panda's hand passes it."""
-_STEP_M, _STEPS = 0.005, 400
-"""How far from the plane y = 0 these places are searched for, from far to near."""
 
 
 @lru_cache(maxsize=1)
@@ -199,9 +159,8 @@ def placement_for(model: RobotModel) -> Placement:
     """Shrink the paper's paths towards the arm's base as little as lets the arm follow them.
 
     All along, hand as in the ready posture, the arm keeps away from singularities, its limits, itself and the floor,
-    and its joints hold its weight. A person's hand is then held beside the circle where the whole free arm passes it
-    by as much as the Panda's hand does. Raises ExperimentError where no such size is found. The Panda and the FR3 have
-    the paper's own. The last arm's is remembered.
+    and its joints hold its weight. Raises ExperimentError where no such size is found. The Panda and the FR3 have the
+    paper's own. The last arm's is remembered.
     """
     if is_shipped(model.description):
         return Placement()
@@ -215,11 +174,12 @@ def placement_for(model: RobotModel) -> Placement:
     for scale in _SCALES:
         placement = Placement(scale, left=left, right=right)
         try:
-            around = [_followed(model, placement.path(name, sign)) for name, sign in _PATHS]
+            for name, sign in _PATHS:
+                _check_path(model, placement.path(name, sign))
         except ExperimentError as reason:
             reasons[str(reason)] = None
         else:
-            return _visited(model, placement, np.concatenate(around[:2]))
+            return placement
     raise ExperimentError(
         f"{model.description.name} cannot follow the paper's paths with its hand as in q_ready, in no size from"
         f" {_SCALES[0]:g} to {_SCALES[-1]:g}: {'; '.join(reasons)}. Give another q_ready in robot.toml, with the hand"
@@ -239,28 +199,6 @@ def assumptions(model: RobotModel, placement: Placement) -> tuple[str, ...]:
     return (*((placement.paths_sentence(arm.name),) if placement != Placement() else ()), assumed_plant(arm))
 
 
-def _visited(model: RobotModel, placement: Placement, postures: FloatArray) -> Placement:
-    """Place the hands of people beside the circle and in the way of an arm that goes through postures (S, n)."""
-    ends = capsule_ends(model, kinematics_of(model, postures))
-    moved = np.isin(model.capsules.link, model.body.link)
-    a, b, radius = ends[:, moved][:, :, 0], ends[:, moved][:, :, 1], model.capsules.radius[moved]
-    aside, places = _STEP_M * np.arange(_STEPS, 0.0, -1.0), list[tuple[float, float]]()
-    for sign in SIGNS.values():
-        x, _, z = placement.visited("beside", sign)
-        at = np.column_stack([np.full(len(aside), x), sign * aside, np.full(len(aside), z)])[:, None, None]
-        free = (segment_distance(a, b, at, at) - radius).min(axis=(1, 2))
-        if not (free < _INSIDE_M).any():
-            raise ExperimentError(
-                f"There is no place for a person's hand in the way of {model.description.name}'s hand on the circle, at"
-                f" x = {x:.2f} m and z = {z:.2f} m: look at the capsules of its last links in arm.xml."
-            )
-        # from the side as far in as nothing of the arm is nearer
-        beside, inside = (aside[max(int(np.argmax(free < clear)) - 1, 0)] for clear in (_BESIDE_M, _INSIDE_M))
-        places.append((float(beside), float(inside)))
-    (right, right_in), (left, left_in) = places
-    return replace(placement, beside=(right, left), inside=(right_in, left_in))
-
-
 def hand_side(model: RobotModel, side: str) -> HandSide:
     """Return where the arm's hand, all that its last joint moves, is widest on a side, posture as in q_ready."""
     kin = model.kinematics(model.description.q_ready)
@@ -274,8 +212,8 @@ def hand_side(model: RobotModel, side: str) -> HandSide:
     return HandSide(max(float(out[widest]), 0.02), float(away[widest, 2]))
 
 
-def _followed(model: RobotModel, path: Path) -> FloatArray:
-    """Return postures (S, n) in which an arm follows a path with its hand upright, or raise why it cannot."""
+def _check_path(model: RobotModel, path: Path) -> None:
+    """Raise why an arm cannot follow a path with its hand upright, if it cannot."""
     points = [path.point(phase) for phase in np.linspace(0.0, path.length, _PLACES)]
     out_of_reach = ExperimentError("the hand does not get everywhere without a singularity or a joint limit")
     try:
@@ -288,7 +226,6 @@ def _followed(model: RobotModel, path: Path) -> FloatArray:
         raise out_of_reach
     _check_room(model, postures)
     _check_torques(model, postures)
-    return postures
 
 
 def _check_room(model: RobotModel, postures: FloatArray) -> None:

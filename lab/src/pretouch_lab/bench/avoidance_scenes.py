@@ -13,7 +13,7 @@ from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin, skin_for
 from pretouch.sim.hand import PersonArm
-from pretouch.sim.paper_scenes import Placement, placement_for, static_path, static_scene
+from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.range_finder import RangeFinderParams
@@ -23,6 +23,7 @@ from pretouch_lab.bench.obstacle import Ball, Cuboid, ShapeAt
 from pretouch_lab.bench.scenes import SeedRange, held, scenario, scenario_path, seed_of
 from pretouch_lab.domain_randomisation import Misplacement, misplaced
 from pretouch_lab.experiments.avoidance import Visit, Visitor, Walk
+from pretouch_lab.placement import UNMOVED, PeoplePlacement, people_placement
 from pretouch_lab.trial import Setup
 
 FAMILIES = ("srdo", "drdo", "person", "hand", "static", "sensing", "arm", "walking")
@@ -30,7 +31,7 @@ FAMILIES = ("srdo", "drdo", "person", "hand", "static", "sensing", "arm", "walki
 Table = dict[str, Any]
 PANDA = "panda"
 """The arm of the scenarios' coordinates."""
-_UNMOVED, _USUAL = Placement(), PlantParams()
+_USUAL = PlantParams()
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +86,9 @@ def arm(name: str = PANDA) -> RobotModel:
 
 
 @cache
-def place(name: str = PANDA) -> Placement:
+def place(name: str = PANDA) -> PeoplePlacement:
     """Return the placement of the scenarios' paths and obstacles for an arm."""
-    return placement_for(arm(name))
+    return people_placement(arm(name))
 
 
 @cache
@@ -125,7 +126,7 @@ def setting(scenario: Scenario, profile: Profile, seed: int, name: str = PANDA) 
     return Setting(setup, shape, done)
 
 
-def path_of(params: Table, where: Placement = _UNMOVED) -> Path:
+def path_of(params: Table, where: PeoplePlacement = UNMOVED) -> Path:
     """Return the path of a scenario at its place for an arm."""
     if params["kind"] == "held":
         return held(np.array(where.point(*params["point"])))
@@ -167,14 +168,14 @@ def _visiting(obstacle: Table, seed: int, name: str) -> tuple[ShapeAt, Table]:
     rng, where = np.random.default_rng([seed, 21]), place(name)
     side = rng.choice([-1.0, 1.0])
     # shifted like the hands of the paper's experiment, from the place for the Panda
-    off = np.subtract(where.visited("beside", side), _UNMOVED.visited("beside", side))
+    off = np.subtract(where.visited("beside", side), UNMOVED.visited("beside", side))
     at = np.array([obstacle["x_m"], side * obstacle["y_m"], obstacle["z_m"]]) + off
     visit = Visit(obstacle["arrive_s"], obstacle["leave_s"], at + obstacle["spread_m"] * rng.uniform(-1, 1, 3))
     spec = HandSpec(obstacle["radius_m"], obstacle["mass_kg"], obstacle["contact_stiffness_n_m"])
     return lambda hand: Ball(hand, spec.radius), {"scene": SceneSpec(hand=spec), "hand": Visitor(arm(name), (visit,))}
 
 
-def _walking(obstacle: Table, seed: int, where: Placement) -> tuple[ShapeAt, Table]:
+def _walking(obstacle: Table, seed: int, where: PeoplePlacement) -> tuple[ShapeAt, Table]:
     """Place a person or a hand that moves straight in and stays; the seed draws speed, time and perhaps the side."""
     rng = np.random.default_rng([seed, 20])
     side = rng.choice([-1.0, 1.0]) if obstacle.get("both_sides") else 1.0

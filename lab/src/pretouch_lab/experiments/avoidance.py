@@ -12,7 +12,6 @@ from pretouch.control.path import Path, WayPoints
 from pretouch.errors import ExperimentError
 from pretouch.robot.model import RobotModel
 from pretouch.sim.hand import FREE_N, HOME, LEAD_S, HandGoal, PersonArm, point_on_arm, robot_hand
-from pretouch.sim.paper_scenes import Placement
 from pretouch.sim.plant import Plant
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import TextTable
@@ -22,6 +21,7 @@ from pretouch_lab.bench.scenes import scenario
 from pretouch_lab.encounters import GHOST_M, LEAVING_S, SOFT_M_S, SOFT_N, encounters, ghosts, met
 from pretouch_lab.experiment import Context, Drawing, Experiment, controllers, first_sensing
 from pretouch_lab.options import TrialOptions
+from pretouch_lab.placement import UNMOVED, PeoplePlacement
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, medians, ratios, rounded, share_above, summary, table
 from pretouch_lab.trial import Record, play
@@ -32,7 +32,6 @@ PLACES = ("beside", "inside", "beside line", "inside line", "walking", "nobody",
 """Places of the person's hand: 3 cm clear of the robot's hand on the free circle or line, half in its way on the circle
 or wholly on the line; that of a person who walks about beside the circle; or nobody."""
 _SPREAD_M = 0.03
-_UNMOVED = Placement()
 _CLEAR_M = 0.4
 """Least distance of the robot's hand at which the person enters [m]."""
 _ALONG = 0.5
@@ -102,14 +101,14 @@ def cells(options: TrialOptions) -> list[Row]:
     return [{"place": place, **each} for place, each in product(options.places, controllers(options, "slack"))]
 
 
-def path_of(place: str, where: Placement) -> Path:
+def path_of(place: str, where: PeoplePlacement) -> Path:
     """Return the circle, or the line to and fro."""
     line = where.path("line", -1.0)
     ends = np.array([line.point(0.0), line.point(line.length)])
     return WayPoints(ends, closed=True) if place.endswith("line") else where.path("circle", -1.0)
 
 
-def visits(place: str, seed: int, placement: Placement = _UNMOVED) -> tuple[Visit, ...]:
+def visits(place: str, seed: int, placement: PeoplePlacement = UNMOVED) -> tuple[Visit, ...]:
     """Return a visit on each side of the path, at a place that the seed varies by a few centimetres."""
     rng, every = np.random.default_rng([seed, 12]), []
     for (arrive, leave), side in zip(_VISITS_S, (-1.0, 1.0), strict=True):
@@ -122,7 +121,7 @@ def visits(place: str, seed: int, placement: Placement = _UNMOVED) -> tuple[Visi
     return tuple(every)
 
 
-def walk(seed: int, placement: Placement) -> Walk:
+def walk(seed: int, placement: PeoplePlacement) -> Walk:
     """Return the walk of a person who passes, comes to the path and moves about, leaves, comes back, and leaves."""
     rng = np.random.default_rng([seed, 13])
     side, start, far = rng.choice([-1.0, 1.0]), rng.uniform(2.0, 4.0), (0.5, 1.8)
