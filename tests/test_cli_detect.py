@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 
 from pretouch.cli.detect import Detect
 from pretouch.errors import ParameterError, PretouchError, RecordingError
+from pretouch.robot.description import panda
+from pretouch.robot.model import RobotModel
 from pretouch.units.skin_recording import SkinRecording
 from tests.imported_data.files import PUSHES, force_columns, pushed, wrenches, write_bag, write_csv
 from tests.imported_data.joint_files import Moving
@@ -127,6 +130,19 @@ def test_joint_torques_are_detected_on_by_pretouch_and_paper(capsys, pushed_arm,
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("gravity", "degrees"), [((0, 0, 1), 180), ((1, 0, 0), 90), ((0, 1, 0), 90), ((0.5, 0, -(0.75**0.5)), 30)]
+)
+def test_an_arm_detects_as_a_standing_one_does_however_it_is_mounted(capsys, tmp_path, gravity, degrees):
+    model = RobotModel(replace(panda(), gravity=np.array(gravity)))
+    arm, numbers = Moving(model, 12.0, ((9.0, 0.4, "panda_link5", (0.0, 25.0, 0.0)),), rate=100.0), tmp_path / "a.json"
+    Detect(arm.raw_csv(tmp_path / "a.csv"), ("pretouch",), json=numbers).run()
+    assert f"in the base frame, {degrees} degrees from where the arm's description has it" in capsys.readouterr().out
+    (contact,) = json.loads(numbers.read_text())["profiles"][0]["contacts"]
+    assert contact["link"] == "panda_link5"
+    assert 9.0 < contact["time_s"] < 9.1
+
+
 def test_with_a_force_beside_torques_each_can_be_had(capsys, pushed_arm, tmp_path):
     _, moving = pushed_arm
     kinds = (("q*_rad", moving.q), ("tau_ext*_Nm", moving.tau_ext))

@@ -59,11 +59,10 @@ def test_one_kilogram_pulls_the_joints_as_computed_by_hand(panda_model):
 
 def test_a_centre_off_the_origin_has_moments_and_inertia(panda_model):
     R = np.diag([1.0, -1.0, -1.0])  # the hand points down: z of the hand is -z of the base
-    np.testing.assert_allclose(
-        wrench_of(Payload(2.0, (0.1, 0.0, 0.05)), R, np.zeros(6)), [0, 0, -19.62, 0, 1.962, 0], atol=1e-12
-    )
+    wrench = wrench_of(Payload(2.0, (0.1, 0.0, 0.05)), R, np.array([0, 0, 9.81, 0, 0, 0]))
+    np.testing.assert_allclose(wrench, [0, 0, -19.62, 0, 1.962, 0], atol=1e-12)
     # accelerated along x at 3 m/s^2, and about z at 4 rad/s^2 with a lever of 0.1 m along x: 0.4 m/s^2 along y
-    force = wrench_of(Payload(2.0, (0.1, 0.0, 0.0)), R, np.array([3.0, 0, 0, 0, 0, 4.0]))[:3]
+    force = wrench_of(Payload(2.0, (0.1, 0.0, 0.0)), R, np.array([3.0, 0, 9.81, 0, 0, 4.0]))[:3]
     np.testing.assert_allclose(force, [-6.0, -0.8, -19.62], atol=1e-12)
 
 

@@ -1,6 +1,7 @@
 """What may be learnt as a load: a weight at the end-effector, and nothing else that lasts."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from tests.contact.alone import begun as feel_init
 from tests.contact.alone import feel, something, standing
 
 from pretouch.contact.detector import Detection
-from pretouch.contact.lasting_load import load_misfit
+from pretouch.contact.lasting_load import load_misfit, tilt_into
 from pretouch.profiles import Profile, profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
@@ -36,8 +37,20 @@ NOTHING = no_obstacles()
     ids=["gripped", "put down", "pushed from below", "too heavy", "pushed aside", "off the axis", "far off it"],
 )
 def test_a_weight_is_a_load_and_another_force_is_not(residual, known, load):
-    found = load_misfit(residual, known * KG, KG, J, 0.05 * np.eye(7), np.empty(3))
+    found = load_misfit(residual, known * KG, KG, J[3:5], 0.05 * np.eye(7), np.empty(3))
     assert (found < np.inf) is load
+
+
+def test_a_load_beside_the_hand_of_a_tilted_arm_is_a_load_with_its_moments():
+    model = RobotModel(replace(panda(), gravity=np.array([0.6, 0.0, -0.8])))
+    tilt, load, (force, beside) = np.empty((2, 7)), np.empty(3), (0.5 * model.gravity, np.array([0.05, 0.1, 0.0]))
+    tilt_into(model.mechanism.upright, J, tilt)
+    torque = J[:3].T @ force + J[3:].T @ np.cross(beside, force)
+    left = load_misfit(torque, np.zeros(7), J[:3].T @ model.gravity, tilt, 0.05 * np.eye(7), load)
+    assert left < 0.1
+    assert load[0] == pytest.approx(0.5, abs=0.02)
+    # standing, the same torques would be those of a push aside
+    assert load_misfit(torque, np.zeros(7), KG, J[3:5], 0.05 * np.eye(7), load) == np.inf
 
 
 def course(

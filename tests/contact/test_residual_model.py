@@ -1,6 +1,9 @@
 """Free motion learnt: mean against batch least squares, spread against its definition, bounds, and what is kept."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
@@ -20,6 +23,8 @@ from pretouch.contact.residual_model import (
 )
 from pretouch.contact.scatter import LENGTHS
 from pretouch.params import SequentialParams
+from pretouch.robot.description import panda
+from pretouch.robot.model import RobotModel
 
 P = SequentialParams()
 
@@ -58,17 +63,19 @@ def test_the_covariance_stays_between_nothing_and_the_prior_whatever_is_excited(
     assert np.linalg.eigvalsh(np.diag(prior) - C).min() > -1e-9
 
 
-def test_features_of_gravity_are_the_gravity_torques_of_the_model_and_that_of_a_load_has_its_inertia(panda_model):
-    q, growth = panda_model.description.q_ready + 0.1, np.linspace(-3.0, 4.0, 7)
-    kin = panda_model.kinematics(q)
+@pytest.mark.parametrize("down", [(0.0, 0.0, -1.0), (0.6, 0.0, -0.8)])
+def test_features_of_gravity_are_the_gravity_torques_of_the_model_and_that_of_a_load_has_its_inertia(down):
+    model = RobotModel(replace(panda(), gravity=np.array(down)))
+    q, growth = model.description.q_ready + 0.1, np.linspace(-3.0, 4.0, 7)
+    kin = model.kinematics(q)
     x = np.empty((7, features_of(7)))
-    features_into(kin, panda_model.mechanism, np.zeros(7), np.zeros(7), x)
-    _, gravity = panda_model.mass_matrix_and_bias(q, np.zeros(7), np.zeros(7))
+    features_into(kin, model.mechanism, np.zeros(7), np.zeros(7), x)
+    _, gravity = model.mass_matrix_and_bias(q, np.zeros(7), np.zeros(7))
     # the torque that holds the arm is the opposite of what gravity does, summed over all links
     assert_allclose(x[:, PLAIN : PLAIN + 7].sum(axis=1), -gravity, atol=1e-9)
-    J = panda_model.ee_jacobian(kin)[:3]
-    features_into(kin, panda_model.mechanism, np.zeros(7), growth, x)
-    assert_allclose(x[:, -1], J.T @ (np.array([0.0, 0.0, -9.81]) - J @ growth), atol=1e-12)
+    J = model.ee_jacobian(kin)[:3]
+    features_into(kin, model.mechanism, np.zeros(7), growth, x)
+    assert_allclose(x[:, -1], J.T @ (9.81 * np.array(down) - J @ growth), atol=1e-12)
 
 
 def test_the_spread_turns_with_the_inertia_and_has_a_floor():

@@ -31,7 +31,7 @@ class Moving:
                     point = kin.position[k] + kin.rotation[k] @ model.mechanism.links.com[k]
                     self.external[i] += model.jacobian(kin, k, point)[:3].T @ np.array(force)
             mass, bias = model.mass_matrix_and_bias(q, qd, np.empty(n))
-            load = payload * model.ee_jacobian(kin)[:3].T @ np.array([0.0, 0.0, 9.81])
+            load = payload * model.ee_jacobian(kin)[:3].T @ -model.gravity
             self.driving[i] = mass @ qdd[i] + bias - self.external[i] + friction[i] + load
         self.driving += 0.1 * rng.standard_normal((len(t), n))
         unknown, keep = self.external - friction, np.exp(-60.0 / rate)

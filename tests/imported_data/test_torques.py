@@ -170,6 +170,35 @@ def test_no_sign_is_taken_that_leaves_the_torques_unexplained(tmp_path, short):
         read_torques(other, Choice(sign="by-robot"))
 
 
+GAINS = np.array([10.0, 11.0, 9.0, 8.0, 5.0, 4.0, 3.0])
+
+
+@pytest.mark.parametrize(
+    ("change", "choice", "words"),
+    [
+        (lambda tau, weight: tau - weight @ [0, 0, -9.81], {}, "have no gravity in them, so they are external or"),
+        (lambda tau, weight: tau / GAINS, {}, "the model's times .*, joint by joint, as motor currents"),
+        (lambda tau, weight: tau, {"gravity": (1, 0, 0)}, "points along 0,0,-1 in its base frame, not 1,0,0: give"),
+        (
+            lambda tau, weight: -tau - weight @ [-9.81, 0, 9.81], {},
+            "minus those of an arm whose gravity points along -1,0,0: give the other --sign and --gravity -1,0,0",
+        ),
+    ],
+)  # fmt: skip
+def test_torques_of_another_kind_are_refused_and_named(tmp_path, panda_model, short, change, choice, words):
+    weight = np.array([panda_model.weights(q) for q in short.q])
+    columns = short.columns(("q*_rad", short.q), ("dq*_rad_s", short.qd), ("tau*_Nm", change(short.driving, weight)))
+    with pytest.raises(RecordingError, match=words):
+        read_torques(write_csv(tmp_path / "a.csv", columns), Choice(**choice))
+
+
+def test_external_torques_of_an_arm_that_is_mounted_otherwise_than_it_thinks_are_refused(tmp_path, panda_model, short):
+    weight = np.array([panda_model.weights(q) for q in short.q])
+    file = external(short, tmp_path / "a.csv", short.tau_ext + weight @ [-9.81, 0.0, -9.81])
+    with pytest.raises(RecordingError, match=r"external torques in .* gravity points along 1,0,0 in its base frame"):
+        read_torques(file, Choice())
+
+
 def external(short, file, tau):
     return write_csv(file, short.columns(("q*_rad", short.q), ("dq*_rad_s", short.qd), ("tau_ext*_Nm", tau)))
 
@@ -184,12 +213,11 @@ def test_external_torques_with_gravity_or_in_millinewtons_are_refused(tmp_path, 
 
 @pytest.mark.slow
 def test_currents_need_gains_and_are_then_torques(tmp_path, short):
-    gains = np.array([10.0, 11.0, 9.0, 8.0, 5.0, 4.0, 3.0])
-    columns = short.columns(("q*_rad", short.q), ("dq*_rad_s", short.qd), ("current*_A", short.driving / gains))
+    columns = short.columns(("q*_rad", short.q), ("dq*_rad_s", short.qd), ("current*_A", short.driving / GAINS))
     file = write_csv(tmp_path / "a.csv", columns)
     with pytest.raises(RecordingError, match="currents of 7 motors and 0 gains: give --gains"):
         read_torques(file, Choice())
-    recording = read_torques(file, Choice(gains=tuple(gains)))
+    recording = read_torques(file, Choice(gains=tuple(GAINS)))
     same = read_torques(short.raw_csv(tmp_path / "b.csv"), Choice())
     np.testing.assert_allclose(recording.tau_ext, same.tau_ext, atol=1e-9)
     assert "for_currents" in codes(found_in(recording).notes)

@@ -67,6 +67,16 @@ def test_the_envelope_of_the_fr3_is_the_one_its_vendor_publishes():
         assert np.all((beyond > -8e-3) & (beyond < 4e-4))
 
 
+def test_a_mounting_stands_in_the_file_and_a_direction_that_is_none_is_refused(tmp_path):
+    folder = copied_panda(tmp_path)
+    assert "gravity" not in (folder / "robot.toml").read_text()
+    (folder / "robot.toml").write_text(description_text(replace(panda(), gravity=np.array([0.0, -3.0, 4.0]))))
+    np.testing.assert_allclose(RobotModel(load_description(folder)).gravity, [0.0, -5.886, 7.848])
+    np.testing.assert_allclose(RobotModel(robot_named(str(folder), (1.0, 0.0, 0.0))).gravity, [9.81, 0.0, 0.0])
+    with pytest.raises(RobotModelError, match=r"gravity is .*: give its direction in the base frame"):
+        robot_named("panda", (0.0, 0.0, 0.0))
+
+
 @pytest.mark.parametrize("name", ["qd_max", "qdd_max", "tau_max"])
 @pytest.mark.parametrize(
     "bad",

@@ -153,13 +153,20 @@ def test_dynamics_are_the_inverse_dynamics_of_mujoco(bare, fraction, qd, qdd):
     np.testing.assert_allclose(arm.mass_matrix(data.qpos), mass_matrix, rtol=0, atol=1e-12)
 
 
-def test_the_stretched_fr3_weighs_what_its_links_do(fr3_model):
+@pytest.mark.parametrize(
+    ("gravity", "shares"), [((0, 0, -1), (0, 1)), ((0, 0, 1), (0, -1)), ((0, 0.5, -(0.75**0.5)), (0.5, 0.75**0.5))]
+)
+def test_the_stretched_fr3_weighs_what_its_links_do_however_it_is_mounted(gravity, shares):
     # at zero all frames are turned about x alone: the shoulder carries each centre of mass with its x in the base
     masses = [2.9355370338, 2.2449013699, 2.6155955791, 2.3271207594, 1.8170376524, 0.6271432862, 0.73]
     x = [0.0031828864, 0.0407015686, 0.0825 - 0.0459100965, -0.0016039605, 0.0597131221, 0.088 + 0.0045225817]
     hand = 0.088 - 0.01 * np.cos(np.pi / 4)
     torque = -9.81 * np.dot(masses, [*x, hand])
-    assert fr3_model.mass_matrix_and_bias(*np.zeros((3, 7)))[1][1] == pytest.approx(torque, abs=1e-3)
+    model = RobotModel(replace(fr3(), gravity=np.array(gravity)))
+    # joint 1 turns about z, joint 2 about y: of a weight at x they carry the parts along y and along -z
+    _, bias = model.mass_matrix_and_bias(*np.zeros((3, 7)))
+    assert bias[:2] == pytest.approx(np.multiply(shares, torque), abs=1e-3)
+    np.testing.assert_allclose(model.weights(np.zeros(7)) @ model.gravity, bias, atol=1e-9)
 
 
 @pytest.mark.parametrize("disturbance", [1.0, np.nan, np.inf])

@@ -54,6 +54,14 @@ def test_a_force_at_rest_that_would_hide_contacts_is_refused(controller, panda_m
     assert re.search(said, findings[what].sentence)
 
 
+def test_torques_of_an_arm_that_is_mounted_otherwise_are_refused_and_named(controller, panda_model):
+    standing = seen(PushedArm(panda_model))
+    weight = panda_model.weights(standing.newest.q) @ (panda_model.gravity - [9.81, 0.0, 0.0])
+    (finding,) = found(controller, replace(standing, tau_ext=standing.tau_ext + weight))
+    assert (finding.what, finding.level) == ("mounting", "fault")
+    assert re.search(r"gravity points along \(9\.8, -?0\.0, -?0\.0\) m/s\^2 in its base frame", finding.sentence)
+
+
 def test_no_force_estimate_is_refused(controller, panda_model):
     standing = seen(PushedArm(panda_model))
     findings = found(controller, replace(standing, wrench=np.full_like(standing.wrench, np.nan)))

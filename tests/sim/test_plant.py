@@ -44,6 +44,18 @@ def push(plant: Plant, link: int, point: FloatArray, force: FloatArray) -> None:
     plant.mj_data.xfrc_applied[link] = [*force, *np.cross(point - plant.mj_data.xipos[link], force)]
 
 
+def test_a_hanging_arm_is_held_by_the_opposite_torques_and_feels_nothing_else(panda_model):
+    hanging = RobotModel(replace(panda_model.description, gravity=np.array([0.0, 0.0, 1.0])))
+    plants = [arm(model, PERFECT) for model in (panda_model, hanging)]
+    for plant in plants:
+        state = record(plant, 0.3)[-1]
+        np.testing.assert_allclose(state.q, panda_model.description.q_ready, atol=1e-3)
+        np.testing.assert_allclose(state.tau_ext, 0.0, atol=0.05)
+    standing, turned = (plant.mj_data.qfrc_bias for plant in plants)
+    assert standing[1] < -10.0
+    np.testing.assert_allclose(turned, -standing, atol=0.05)
+
+
 def circle(plant: Plant, duration: float) -> list[RobotState]:
     """Follow the paper's circle at 0.3 m/s, after a second to get up to speed."""
     model, states = plant.model, []

@@ -9,9 +9,6 @@ from pretouch_fci.arm import ServedArm
 from pretouch_fci.frames import pose
 from pretouch_fci.wire import ERRORS, ControllerMode, Protocol
 
-_GRAVITY = (0.0, 0.0, -9.81)
-"""Acceleration of a base at rest as the vendor gives it, whatever the truth [m/s^2]."""
-
 _STILL = np.zeros(7)
 
 
@@ -22,7 +19,7 @@ class StateDatagram:
         self._arm, self._state = arm, np.zeros((), protocol.state)
         # views taken once: looking a field up costs more than writing it
         self._to: dict[str, Any] = {name: self._state[name] for name in protocol.state.names or ()}
-        self._to["O_ddP_O"][:] = _GRAVITY
+        self._to["O_ddP_O"][:] = arm.model.gravity
         self.frames_changed()
 
     def frames_changed(self) -> None:

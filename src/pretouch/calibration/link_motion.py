@@ -26,7 +26,7 @@ class LinkMotion:
     a: FloatArray
     """(N, 3) acceleration of its origin [m/s^2]."""
     R_link_base: FloatArray
-    """(N, 3, 3) turns vectors of the base frame, such as gravity, into the link's."""
+    """(N, 3, 3) turns vectors of a frame whose z points against gravity into the link's."""
     lever: FloatArray
     """(N, 3, 3) L = [alpha]x + [w]x [w]x, so that a point p of the link has the acceleration a + L p."""
 
@@ -65,5 +65,5 @@ class ArmMotion:
             w = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=1)
             a = np.einsum("nij,k,nkj->ni", R_link_base, _SECOND, p)
             lever = R_link_base @ np.einsum("k,nkij->nij", _SECOND, R)
-            self._links[index] = LinkMotion(w, a, R_link_base, lever)
+            self._links[index] = LinkMotion(w, a, R_link_base @ self.model.mechanism.upright.T, lever)
         return self._links[index]

@@ -48,6 +48,9 @@ class Detect(Choice):
     Panda."""
     gains: Numbers = field(default=(), kw_only=True)
     """Torque by motor current of each joint, gear and sign included [Nm/A], separated by commas: for current1_A."""
+    gravity: Numbers = field(default=(), kw_only=True)
+    """Direction of gravity in the arm's base frame, of any length: 0,0,1 for an arm that hangs, 0,0,-1 for one that
+    stands; by default the arm's own, or the one that measured torques tell."""
     rate: float = 0.0
     """Rate of the detector [Hz]; by default the profile's own, 100."""
     out: OptionalFile = None

@@ -25,6 +25,9 @@ _SENTENCES = {
     "velocities": "The velocities are {ratio:.2g} times those of the positions, with a correlation of"
     " {correlation:.2f} at the worst joint: check them.",
     "derived_velocities": "Velocities are those of positions.",
+    "mounting": "By the torques gravity points along {gravity} in the base frame, {degrees:.0f} degrees from where the"
+    " arm's description has it. It is taken so, for the model then leaves {share:.1%} of them unexplained and not"
+    " {before:.0%}: give --gravity {gravity}, or write it to robot.toml.",
     "no_commands": "There are no commanded velocities (dq_d1_rad_s ...): the measured ones, smoothed, stand in.",
     "unexplained": "The model of {arm} leaves {share:.0%} of the torques unexplained, so results may be wrong: check"
     " --arm, --payload, units and how the arm is mounted.",

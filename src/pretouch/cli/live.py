@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Literal
 
-from pretouch.cli.options import OptionalFile, UnitOptions
+from pretouch.cli.options import Numbers, OptionalFile, UnitOptions
 from pretouch.cli.warm_up import prepare
 from pretouch.extras import LIVE
 from pretouch.page.real_units import RealUnits
@@ -32,6 +32,8 @@ class Live:
     """Profile to start with, or PROFILE:GROUP.FIELD=VALUE."""
     arm: str = "panda"
     """panda, fr3, or the folder of an imported arm, to which the room is scaled."""
+    gravity: Numbers = ()
+    """Direction of gravity in the arm's base frame, as of `pretouch run`."""
     path: Literal["circle", "line"] = "circle"
     """The paper's path that the arm follows."""
     seed: int = 0
@@ -58,7 +60,7 @@ class Live:
         profile = find_profile(self.profile)
         settings = LiveSettings(profile=profile, path=self.path, seed=self.seed)
 
-        model = RobotModel(robot_named(self.arm))
+        model = RobotModel(robot_named(self.arm, self.gravity))
         settings = settings_for(model, settings)
         skin = skin_for(model, self.skin)
         prepare(profile)

@@ -65,6 +65,9 @@ class RobotOptions:
 
     arm: str = "panda"
     """Model of the arm: panda, fr3, or the folder of an imported arm."""
+    gravity: Numbers = ()
+    """Direction of gravity in the arm's base frame, of any length: 0,0,1 for an arm that hangs; by default the arm's
+    own, for panda and fr3 0,0,-1."""
     confirm_push: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Ask for the guided pushes even if the force sign of this robot is confirmed."""
     learnt: OptionalFile = None

@@ -47,6 +47,8 @@ class ImportArm(ImportOptions):
     """Joint torque limits [Nm]; by default the file's."""
     ready: Numbers = ()
     """Usual start posture [rad], one position per joint, separated by commas; by default one is searched for."""
+    gravity: Numbers = (0.0, 0.0, -1.0)
+    """Direction of gravity in the base frame, of any length: 0,0,1 for an arm that hangs."""
     json: JsonFile = None
 
     def run(self) -> None:

@@ -11,13 +11,12 @@ import numpy as np
 
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.params import SequentialParams
-from pretouch.robot.kinematics import Kinematics
+from pretouch.robot.kinematics import G_M_S2, Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, Payload, RobotState
 from pretouch.values import value
 
 _NOTHING = Payload(0.0)
-_GRAVITY = np.array([0.0, 0.0, 9.81])
 _OBSERVER_1_S = SequentialParams().observer_gain_1_s
 _MASS_PART, _OFF_M = 0.05, 0.02
 """Standard deviations of an announcement: of the mass, as a part of it, and of the centre [m]."""
@@ -61,6 +60,7 @@ def without_load(
     twist = keep * before + (1.0 - keep) * twist
     # by differences, so that it includes the bend of a path: at 1 m/s that adds a fifth of the load's weight
     acceleration = (twist - before) / period
+    acceleration[:3] -= model.gravity
     load, within = wrench_of(state.payload, R, acceleration), state.payload.within_s
     if state.waited < within:
         earlier = wrench_of(state.before, R, acceleration)
@@ -76,10 +76,11 @@ def without_load(
 def wrench_of(payload: Payload, R: FloatArray, acceleration: FloatArray) -> FloatArray:
     """Return force and torque (6,) of a load on the arm, about the end-effector's origin [N, Nm], base frame.
 
-    The end-effector has the orientation R (3, 3) and the acceleration (6,) [m/s^2, rad/s^2].
+    The end-effector has the orientation R (3, 3) and the proper acceleration (6,), at rest that against gravity
+    [m/s^2, rad/s^2].
     """
     lever = R @ np.array(payload.com_m)
-    force = -payload.mass_kg * (_GRAVITY + acceleration[:3] + np.cross(acceleration[3:], lever))
+    force = -payload.mass_kg * (acceleration[:3] + np.cross(acceleration[3:], lever))
     return np.concatenate([force, np.cross(lever, force)])
 
 
@@ -103,12 +104,12 @@ def store_free_torques(state: LoadState, torque: FloatArray, residual: FloatArra
 def widen_for_load(model: ResidualModel, kg: float) -> ResidualModel:
     """Return a model of free motion with the uncertainty of a load whose mass has changed [kg]."""
     covariance = model.covariance.copy()
-    covariance[:, 0, 0] += (kg * _GRAVITY[2] * _OFF_M) ** 2
+    covariance[:, 0, 0] += (kg * G_M_S2 * _OFF_M) ** 2
     covariance[:, -1, -1] += (kg * _MASS_PART) ** 2
     return model._replace(covariance=covariance)
 
 
 def most_kg(model: RobotModel) -> float:
     """Return the load that the joints can hold in the arm's ready posture [kg], its own weight aside."""
-    levers = model.ee_jacobian(model.kinematics(model.description.q_ready))[:3].T @ _GRAVITY
+    levers = model.ee_jacobian(model.kinematics(model.description.q_ready))[:3].T @ model.gravity
     return float((model.description.tau_max / np.maximum(np.abs(levers), 1e-9)).min())

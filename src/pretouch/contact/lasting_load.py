@@ -12,6 +12,7 @@ from pretouch.compiled import kernel
 from pretouch.contact.learning import least_squares_step
 from pretouch.contact.residual_model import PLAIN, FreeSample, ResidualModel, SequentialNumbers, SequentialState
 from pretouch.contact.scatter import LONGEST, WindowMeans
+from pretouch.robot.kinematics import G_M_S2
 from pretouch.types import FloatArray
 
 MOST_KG = 3.0
@@ -19,7 +20,7 @@ MOST_KG = 3.0
 _LEAST_KG = -0.3
 """A load below this is a force from below [kg]: errors of the links' masses may look like so much."""
 _FAR_M = 0.15
-"""Distance of a load's centre from the end-effector's origin along each horizontal base axis [m]: the prior's deviation
+"""Distance of a load's centre from the end-effector's origin along each horizontal axis [m]: the prior's deviation
 for the largest load. A sum of both beyond twice of it is refused, so along one axis alone 0.3 m."""
 _OFFSETS = 3.0
 """Largest offset of a joint after a step, in deviations of its prior."""
@@ -35,7 +36,17 @@ _DEVIATIONS = 4.0
 """Deviations that a constant torque may seem to change, and that a load may leave unexplained."""
 _ALONE_DEVIATIONS = 2.5
 """The same for a step of one joint."""
-_GRAVITY = 9.81
+
+
+@kernel
+def tilt_into(upright: FloatArray, J: FloatArray, tilt: FloatArray) -> None:
+    """Write how joints turn the end-effector (2, n) about two horizontal axes, by its Jacobian J (6, n).
+
+    `upright` (3, 3) is that of `Mechanism`.
+    """
+    for i in range(2):
+        for j in range(tilt.shape[1]):
+            tilt[i, j] = upright[i, 0] * J[3, j] + upright[i, 1] * J[4, j] + upright[i, 2] * J[5, j]
 
 
 @kernel
@@ -50,7 +61,7 @@ def _stands_out(residual: FloatArray, S: FloatArray) -> bool:
 
 @kernel
 def _still_explains(
-    lasting: FloatArray, residual: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, moving: int
+    lasting: FloatArray, residual: FloatArray, unit: FloatArray, tilt: FloatArray, S: FloatArray, moving: int
 ) -> bool:
     """Return whether a lasting load or step (3 + n,), see `find_lasting`, still explains a residual (n,) [Nm].
 
@@ -60,8 +71,8 @@ def _still_explains(
     for j in range(len(residual)):
         largest = max(largest, abs(unit[j] * lasting[0]))
     for j in range(len(residual)):
-        # rows 3 and 4 of J turn about x and y: a weight has no moment about z, the vertical
-        moments = _GRAVITY * (J[3, j] * lasting[1] + J[4, j] * lasting[2])
+        # a weight has no moment about the vertical
+        moments = G_M_S2 * (tilt[0, j] * lasting[1] + tilt[1, j] * lasting[2])
         rest = residual[j] - (lasting[0] * unit[j] + moments + lasting[3 + j])
         # the estimate came from a mean like this one: the difference of both has twice the variance of one
         allowed = _DEVIATIONS**2 * 2.0 * S[j, j] / LONGEST + _CHANGE_NM**2
@@ -75,12 +86,12 @@ def _still_explains(
 
 @kernel
 def find_lasting(
-    means: WindowMeans, x: FloatArray, weights: FloatArray, J: FloatArray, offset_prior: float, lasting: FloatArray
+    means: WindowMeans, x: FloatArray, weights: FloatArray, tilt: FloatArray, offset_prior: float, lasting: FloatArray
 ) -> bool:
     """Write a load or a step of one joint that explains the residual, and return whether there is one.
 
     Of the residual's means only the longest window counts. `x` (n, f) are features with `weights` (n, f) [Nm] of the
-    mean learnt so far, `J` (6, n) is the end-effector's Jacobian, `offset_prior` a joint offset's deviation [Nm].
+    mean learnt so far, `tilt` (2, n) that of `tilt_into`, `offset_prior` a joint offset's deviation [Nm].
     `lasting` (3 + n,) is written: load [kg], its moments about both horizontal axes [kg m], each joint's torque [Nm].
     """
     residual, S, n, last = means.mean[-1], means.S, x.shape[0], x.shape[1] - 1
@@ -92,7 +103,7 @@ def find_lasting(
             carried[j] += weights[j, a] * x[j, a]
     lasting[:] = 0.0
     joint, step, rest = _one_joint(residual, S)
-    misfit = load_misfit(residual, carried, x[:, last].copy(), J, S, load)
+    misfit = load_misfit(residual, carried, x[:, last].copy(), tilt, S, load)
     # the whole offset is bounded, not the step: so pushes that pass for steps cannot accumulate
     if joint >= 0 and abs(weights[joint, 0] + step) <= _OFFSETS * offset_prior and rest < misfit:
         lasting[3 + joint] = step
@@ -126,7 +137,7 @@ def _one_joint(residual: FloatArray, S: FloatArray) -> tuple[int, float, float]:
 
 @kernel
 def load_misfit(
-    residual: FloatArray, carried: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, load: FloatArray
+    residual: FloatArray, carried: FloatArray, unit: FloatArray, tilt: FloatArray, S: FloatArray, load: FloatArray
 ) -> float:
     """Write the change of a load (3,), see `find_lasting`, that explains a lasting residual.
 
@@ -134,9 +145,9 @@ def load_misfit(
     that may be weight, `unit` (n,) are the torques of 1 kg [Nm].
     """
     n, whole = len(residual), np.empty(3)
-    misfit = _fit_load(residual, unit, J, S, load)
+    misfit = _fit_load(residual, unit, tilt, S, load)
     # the change has either sign, as a load can be put down; the whole load cannot weigh less than nothing
-    _fit_load(residual + carried, unit, J, S, whole)
+    _fit_load(residual + carried, unit, tilt, S, whole)
     # the centre is too far off: |x| + |y| > 0.3 m; a load below 0.1 kg may have the moments of 0.1 kg
     near = abs(load[1]) + abs(load[2]) <= 2.0 * _FAR_M * max(abs(load[0]), 0.1)
     few = misfit < n + _DEVIATIONS * np.sqrt(2.0 * n)
@@ -145,7 +156,7 @@ def load_misfit(
 
 
 @kernel
-def _fit_load(residual: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, load: FloatArray) -> float:
+def _fit_load(residual: FloatArray, unit: FloatArray, tilt: FloatArray, S: FloatArray, load: FloatArray) -> float:
     """Write the load (3,) that best explains a residual, see `find_lasting`; return its unexplained square."""
     n = len(residual)
     C, L, y, a = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty((3, n))
@@ -157,7 +168,7 @@ def _fit_load(residual: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArr
     # ridge regression of the whitened residual on the weight and both of its moments
     forward(L, unit, a[0])
     for k in range(2):  # the moments of its centre about the horizontal axes
-        forward(L, J[3 + k] * _GRAVITY, a[1 + k])
+        forward(L, tilt[k] * G_M_S2, a[1 + k])
     square = forward(L, residual, y)
     for i in range(3):
         for j in range(n):
@@ -215,7 +226,7 @@ _LOAD_KG, _LOAD_PART = 0.1, 0.05
 @kernel
 def follow_lasting(
     state: SequentialState, reacting: bool, suspected: bool, numbers: SequentialNumbers, sample: FreeSample,
-    means: WindowMeans, J: FloatArray,
+    means: WindowMeans, tilt: FloatArray,
 ) -> None:  # fmt: skip
     """Count the samples that the same load or step explains, and learn it when these are enough.
 
@@ -228,19 +239,19 @@ def follow_lasting(
         numbers: of the test.
         sample: the newest.
         means: of all windows.
-        J: (6, n) Jacobian of the end-effector.
+        tilt: (2, n) of `tilt_into`.
     """
     residual, S, x, model, steady = means.mean[-1], means.S, sample.x, state.model, state.steady
     n, counts = len(residual), suspected or reacting
     # the torques of 1 kg depend on the posture: they are computed anew in each step
-    if steady[0] and _still_explains(state.lasting, residual, x[:, -1].copy(), J, S, sample.moving[0]):
+    if steady[0] and _still_explains(state.lasting, residual, x[:, -1].copy(), tilt, S, sample.moving[0]):
         steady[0] += int(counts)
     else:  # something else, or nothing: the count starts again
         steady[0], counts = 0, suspected or (reacting and _stands_out(residual, S))
     if not counts or 0 < steady[0] <= numbers.settle:
         return
     lasting = np.empty(3 + n)
-    if not find_lasting(means, x, model.weights, J, numbers.p.offset_prior_nm, lasting):
+    if not find_lasting(means, x, model.weights, tilt, numbers.p.offset_prior_nm, lasting):
         # a residual may be unexplained for a while; for too long it is a person
         steady[0] = steady[0] if steady[0] <= 2 * numbers.settle else 0
     elif steady[0] > numbers.settle:

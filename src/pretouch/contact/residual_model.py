@@ -25,7 +25,7 @@ from pretouch.contact.scatter import LENGTHS, LONGEST, level_init, scatter_init
 from pretouch.contact.sequential import Moment, alarm_bound
 from pretouch.params import ProximityPriorParams, SequentialParams
 from pretouch.records import IntCell, zeros
-from pretouch.robot.kinematics import Kinematics, Mechanism, jacobian_into, mass_matrix_into, rotate
+from pretouch.robot.kinematics import G_M_S2, Kinematics, Mechanism, jacobian_into, mass_matrix_into, rotate
 from pretouch.types import FloatArray, IntArray
 
 BLOCK = 4
@@ -38,7 +38,6 @@ RESTING = 4
 """Feature of the friction at rest, see `learning`."""
 _SLOW, _FAST = 0.1, 0.3
 """Joint speeds over which friction reverses [rad/s]: between Coulomb's step and the 0.2 rad/s of a real Panda's."""
-_GRAVITY = 9.81
 
 
 class SequentialNumbers(NamedTuple):
@@ -162,7 +161,7 @@ def features_into(kin: Kinematics, mechanism: Mechanism, speed: FloatArray, grow
     position, rotation, anchor, axis = kin
     moved_by, ee = mechanism.arm
     mass, com = mechanism.links.mass, mechanism.links.com
-    n, point = len(speed), np.empty(3)
+    n, point, up = len(speed), np.empty(3), mechanism.upright[2]
     J = np.empty((6, n))
     x[:] = 0.0
     for j in range(n):
@@ -184,7 +183,7 @@ def features_into(kin: Kinematics, mechanism: Mechanism, speed: FloatArray, grow
             point += position[m]
         jacobian_into(anchor, axis, moved_by[link], point, J)
         # gravity acts as an upward acceleration of the mass; the terms of the velocities are left out
-        ax, ay, az = 0.0, 0.0, _GRAVITY
+        ax, ay, az = G_M_S2 * up[0], G_M_S2 * up[1], G_M_S2 * up[2]
         for j in range(n):
             ax, ay, az = ax + J[0, j] * growth[j], ay + J[1, j] * growth[j], az + J[2, j] * growth[j]
         for j in range(n):  # by the load on the joints: -J^T (g + J qdd)

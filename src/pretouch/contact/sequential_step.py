@@ -11,7 +11,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled, inlined, kernel
-from pretouch.contact.lasting_load import follow_lasting
+from pretouch.contact.lasting_load import follow_lasting, tilt_into
 from pretouch.contact.learning import STIRS_RAD_S, add_to_block, learn_turning, queue_block, slide
 from pretouch.contact.residual_model import (
     BLOCK,
@@ -103,8 +103,9 @@ def assess_sample(
     log_r, window, which = judge(means, contacts, p.contact_gain, p.tails)
     evidence = max(0.0, log_r / level)
 
-    J_ee = np.empty((6, n))
+    J_ee, tilt = np.empty((6, n)), np.empty((2, n))
     jacobian_into(kin.anchor, kin.axis, arm.moved_by[arm.ee], kin.position[arm.ee], J_ee)
+    tilt_into(mechanism.upright, J_ee, tilt)
     results.detectable_n[0] = detectable_force(
         J_ee, numbers.period, means, level - link_prior(mechanism), p.contact_gain, p.tails
     )
@@ -113,7 +114,7 @@ def assess_sample(
     clear = not np.any(distance < p.clear_m)
     if alone and not now.reacting and whole == len(LENGTHS):
         learn_level(log_r, model.level[regime])
-    _learn(state, now.reacting, numbers, sample, means, J_ee, (alone, clear), evidence >= p.suspect)
+    _learn(state, now.reacting, numbers, sample, means, tilt, (alone, clear), evidence >= p.suspect)
 
     for j in range(n):  # only now: the learning uses the noise alone
         covariance[j, j] += results.model_variance[j]
@@ -132,11 +133,11 @@ def assess_sample(
 @inlined
 def _learn(
     state: SequentialState, reacting: bool, numbers: SequentialNumbers, sample: FreeSample, means: WindowMeans,
-    J: FloatArray, free: tuple[bool, bool], suspected: bool,
+    tilt: FloatArray, free: tuple[bool, bool], suspected: bool,
 ) -> None:  # fmt: skip
     """Learn from a sample; update the counts of calm and lasting samples.
 
-    `J` (6, n) is the Jacobian of the end-effector, `free` says whether no obstacle touches the arm and whether none is
+    `tilt` (2, n) is of `tilt_into`, `free` says whether no obstacle touches the arm and whether none is
     near it, `suspected` whether a contact is suspected.
     """
     model, p, period, at, full = state.model, numbers.p, numbers.period, state.at[0], means.whole == len(LENGTHS)
@@ -156,7 +157,7 @@ def _learn(
     # a lasting residual matters only if it disturbs the arm; calm samples learn it anyway
     unclear = state.steady[0] > 0 or suspected or reacting
     if numbers.settle > 0 and alone and clear and full and (state.calm[0] < CALM or suspected) and unclear:
-        follow_lasting(state, reacting, suspected, numbers, sample, means, J)
+        follow_lasting(state, reacting, suspected, numbers, sample, means, tilt)
     else:
         state.steady[0] = 0
 

@@ -139,7 +139,7 @@ class Bag:
             for connection, time, raw in reader.messages(connections):
                 topics[connection.topic].add(time, reader.deserialize(raw, connection.msgtype))
         joints = [topic for topic in topics.values() if topic.fields[0] == "q"]
-        model = arm_of([name for topic in joints for name in topic.names], self._choice.arm)
+        model = arm_of([name for topic in joints for name in topic.names], self._choice)
         parts = [topic.rows(self._place, model if topic in joints else None) for topic in topics.values()]
         # a simulation's stamps may begin with one of zero
         headers = all(np.count_nonzero(rows.header == 0) <= 1 for rows in parts)

@@ -48,6 +48,8 @@ class Choice:
     recording has."""
     arm: str | RobotModel = "auto"
     """The arm, or its name or the folder it was imported to; auto: by the names of its joints, otherwise a Panda."""
+    gravity: tuple[float, ...] = ()
+    """(3,) direction of gravity in the arm's base frame; by default the arm's own, or what measured torques tell."""
     columns: str = ""
     """Columns of other names, THEIRS=OURS separated by commas: tau_J_0=tau1_Nm; tau_J_*=tau*_Nm is all joints."""
     gains: tuple[float, ...] = ()
@@ -139,11 +141,12 @@ class ImportedRecording:
         return float(1.0 / np.median(np.diff(self.time)))
 
 
-def arm_of(names: Sequence[str], arm: str | RobotModel) -> RobotModel:
-    """Return an arm by its name, or the one that the names of joints tell of, otherwise a Panda."""
-    if isinstance(arm, RobotModel):
+def arm_of(names: Sequence[str], choice: Choice) -> RobotModel:
+    """Return the arm of a choice; for auto the one that the names of joints tell of, otherwise a Panda."""
+    if isinstance(arm := choice.arm, RobotModel):
         return arm
-    return RobotModel(robot_named(("fr3" if "fr3" in " ".join(names) else "panda") if arm == "auto" else arm))
+    name = ("fr3" if "fr3" in " ".join(names) else "panda") if arm == "auto" else arm
+    return RobotModel(robot_named(name, choice.gravity))
 
 
 def joint_places(place: Path, names: Sequence[str], model: RobotModel) -> list[int]:

@@ -109,7 +109,7 @@ class Table:
                 " so; `pretouch detect --columns` takes other names."
             )
         joints = list(self._parts("q")) if "q" in needed else []
-        model = arm_of(joints, self._choice.arm)
+        model = arm_of(joints, self._choice)
         places, sources = {}, {}
         for kind in sorted({*needed, *also} & self.kinds, key=list(_UNITS).index):
             parts = self._parts(kind)

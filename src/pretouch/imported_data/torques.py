@@ -1,5 +1,6 @@
 """Joint torques of any arm: read, checked, and brought to external torques on the robot."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,22 +9,28 @@ import scipy  # its parts load when they are first used: a quarter of a second t
 from pretouch.errors import RecordingError
 from pretouch.imported_data.log import TORQUES, Choice, ImportedRecording, Log, Note, check_reach, listed
 from pretouch.params import SequentialParams
+from pretouch.robot.description import STANDING
+from pretouch.robot.kinematics import G_M_S2
 from pretouch.robot.model import RobotModel
 from pretouch.sim.observer import observe, observer_init
 from pretouch.types import FloatArray
 from pretouch.values import value
 
-_GRAVITY = np.array([0.0, 0.0, 9.81])
 _MOVING_RAD_S = 0.01
 """Speed of a joint, root mean square, from which its velocity tells something [rad/s]."""
 _ALIKE, _UNLIKE = 0.9, 0.5
 """Correlation from which on, and below which, two velocities are taken to be the same, or not."""
 _FAR_BETTER = 0.25
 """Part of the squared error that another explanation may leave to be believed [1]."""
-_MOST = 0.5
-"""Part of the squared torques from which on they count as unexplained [1]."""
+_LITTLE, _MOST = 0.1, 0.5
+"""Parts of the squared torques up to which an explanation leaves little, and from which on most [1]: a Panda's model
+leaves 1 to 9 % beside a tool of 3 kg that it lacks."""
 _REVERSING_RAD_S = 0.1
 """Speed over which friction changes its sign [rad/s]."""
+_LEAN_DEG = 7.0
+"""Smallest angle between two directions of gravity that are told apart [degrees]: that tool tilts an estimate by 6."""
+_LIGHT, _HEAVY = 0.5, 1.5
+"""Sizes of an estimated acceleration by gravity between which it is one, as a part of the true one [1]."""
 _SAMPLES = 400
 """How many samples are looked at."""
 _THOUSAND = (300.0, 3000.0)
@@ -75,8 +82,10 @@ def torque_recording(log: Log, choice: Choice) -> TorqueRecording:
     torque = (-1.0 if by_robot else 1.0) * log.arrays[kind] * (np.array(choice.gains) if kind == "current" else 1.0)
     expected = _expected(model, time, q, qd, choice.payload)
     _check_units(log.place, torque, expected, model, kind != "tau_ext")
+    model, mounting = _mounted(log.place, (q, qd, torque), expected, model, kind, choice)
     if kind != "tau_ext":
-        notes += _check_signs(log.place, qd, torque, expected, model, by_robot)
+        expected = _expected(model, time, q, qd, choice.payload)
+        notes += [*mounting, *_check_signs(log.place, qd, torque, expected, model, by_robot)]
         torque = observed(model, time, q, qd, torque, SequentialParams().observer_gain_1_s, choice.payload)
     if "dq_d" not in log.arrays:
         notes.append(Note("no_commands", {}))
@@ -148,11 +157,34 @@ def _check_units(place: Path, tau: FloatArray, expected: FloatArray, model: Robo
             " mNm, name the columns tau1_mNm or tau_ext1_mNm and so on."
         )
     same, other = (float(((tau - sign * expected) ** 2).sum()) for sign in (1.0, -1.0))
-    if not measured and min(same, other) < _FAR_BETTER * float((tau**2).sum()):
+    if not measured and min(same, other) < _LITTLE * float((tau**2).sum()):
         raise RecordingError(
             f"The external torques in {place} are {'' if same < other else 'minus '}those that hold the arm: gravity is"
             " still in them, so name the columns tau1_Nm and so on for our own observer."
         )
+
+
+def _left(rest: FloatArray, qd: FloatArray) -> FloatArray:
+    """Squares of torques (S, n) [Nm] less the friction that explains them best, summed by joint (n,).
+
+    Friction never drives: its coefficients are at least 0, so that it tells the sign of a joint without gravity too.
+    The worst tenth of the samples does not count: there somebody may touch the arm.
+    """
+    turning, rest = np.stack([np.tanh(qd / _REVERSING_RAD_S), qd], axis=2), rest.copy()
+    for j in range(rest.shape[1]):
+        rest[:, j] -= turning[:, j] @ scipy.optimize.nnls(turning[:, j], rest[:, j])[0]
+    best = np.argsort((rest**2).sum(axis=1))[: int(0.9 * len(rest))]
+    return np.asarray((rest[best] ** 2).sum(axis=0))
+
+
+def _fitted(hold: FloatArray, weights: FloatArray, qd: FloatArray) -> tuple[FloatArray, float, float]:
+    """Fit gravity to torques (S, n) [Nm] that hold an arm of weights (S, n, 3) [kg m].
+
+    Returns its acceleration (3,) [m/s^2], how many times the true one that is, and the squares that it leaves.
+    """
+    gravity = np.asarray(np.linalg.lstsq(weights.reshape(-1, 3), hold.ravel())[0], np.float64)
+    left = _left(hold - weights @ gravity, qd)
+    return gravity, float(np.linalg.norm(gravity)) / G_M_S2, float(left.sum())
 
 
 def _check_signs(
@@ -163,13 +195,8 @@ def _check_signs(
     `expected` (S, n) are the model's, `by_robot` tells that all are turned round already. RecordingError for reversed
     joints, and for torques turned round that stay unexplained; notes for others that do, and for unsure joints.
     """
-    qd, tau, joints = _some(qd), _some(tau), np.arange(model.n)
-    turning = np.stack([np.tanh(qd / _REVERSING_RAD_S), qd], axis=2)
-    # friction never drives: its coefficients are at least 0, so that it tells the sign of a joint without gravity too
-    same, other = (
-        np.array([scipy.optimize.nnls(turning[:, j], s * tau[:, j] - expected[:, j])[1] ** 2 for j in joints])
-        for s in (1.0, -1.0)
-    )
+    qd, tau = _some(qd), _some(tau)
+    same, other = (_left(s * tau - expected, qd) for s in (1.0, -1.0))
     whole = (tau**2).sum(axis=0)
     wrong = (other < _FAR_BETTER * same) & (other < _MOST * whole)
     right = (same < _FAR_BETTER * other) & (same < _MOST * whole)
@@ -187,6 +214,67 @@ def _check_signs(
     unexplained = [Note("unexplained", {"share": rest, "arm": arm})] if rest >= _MOST else []
     unsure = [model.joints[j] for j in np.flatnonzero(~right)]
     return [*unexplained, *([Note("unsure_signs", {"names": listed(unsure)})] if unsure else [])]
+
+
+def _direction(gravity: FloatArray) -> str:
+    """Return a direction (3,) as --gravity takes it; near an axis that axis, for walls and ceilings are square."""
+    down = gravity / np.linalg.norm(gravity)
+    axis = np.round(down)
+    if np.abs(axis).sum() == 1.0 and down @ axis > np.cos(np.deg2rad(_LEAN_DEG)):
+        down = axis
+    return ",".join(f"{x:.3g}" for x in down.round(3) + 0.0)
+
+
+def _mounted(
+    place: Path, motion: tuple[FloatArray, ...], expected: FloatArray, model: RobotModel, kind: str, choice: Choice
+) -> tuple[RobotModel, list[Note]]:
+    """Return the arm with the direction of gravity that measured torques have, and a note where it is another one.
+
+    `motion` has positions, velocities and torques (N, n), `expected` (S, n) is by the description. Of explanations that
+    leave little, and far less than the description, one must leave far less than the others. RecordingError for others
+    than gravity, for two that are alike, for a direction that somebody gave otherwise, and for external torques.
+    """
+    q, speed, tau = map(_some, motion)
+    loads = [choice.payload * model.ee_jacobian(model.kinematics(p))[:3].T for p in q]
+    weights = np.array([model.weights(p) for p in q]) - loads
+    weight, external = weights @ model.gravity, "external " if kind == "tau_ext" else ""
+    # an interface takes for external the torque of the gravity that it knows less that of the true one
+    hold = weight - tau if external else tau - expected + weight
+    same, whole, free = (float(_left(x, speed).sum()) for x in (hold - weight, tau, hold))
+    gravity, size, left = _fitted(hold, weights, speed)
+    down, lean = _direction(gravity), model.lean(gravity)
+    if not external and same > _MOST * whole and size < _LIGHT and left > _MOST * free:
+        raise RecordingError(
+            f"The torques in {place} have no gravity in them, so they are external or commanded ones (tau_J_d): name"
+            " external torques tau_ext1_Nm and so on, or give those that were measured."
+        )
+    explanations = list[tuple[float, str, str]]()
+    if lean > _LEAN_DEG and _LIGHT < size < _HEAVY:
+        tell = "tell the robot, or name measured torques tau1_Nm and so on, with" if external else "give"
+        along = f"those of an arm whose gravity points along {down} in its base frame, not {_direction(model.gravity)}"
+        explanations.append((left, along, f"{tell} --gravity {down}"))
+    if not external:
+        other, size, rest = _fitted(weight - tau - expected, weights, speed)
+        if rest < _FAR_BETTER * left and model.lean(other) < _LEAN_DEG:
+            return model, []  # of the other sign, and nothing else: `_check_signs` names it
+        turned = f"minus those of an arm whose gravity points along {_direction(other)}"
+        rest = rest if _LIGHT < size < _HEAVY else np.inf
+        explanations.append((rest, turned, f"give the other --sign and --gravity {_direction(other)}"))
+        scale = (tau * expected).sum(axis=0) / np.maximum((expected**2).sum(axis=0), 1e-12)
+        times = f"the model's times {', '.join(f'{x:.2g}' for x in scale)}, joint by joint, as motor currents are"
+        rest = float(_left(tau - scale * expected, speed).sum()) if (scale > 0.0).all() else np.inf
+        explanations.append((rest, times, "name the columns current1_A and so on, and give --gains"))
+    good = sorted(e for e in explanations if e[0] < min(_LITTLE * whole, _FAR_BETTER * same))
+    good = good[: 1 if len(good) < 2 or good[0][0] < _FAR_BETTER * good[1][0] else 2]
+    if not good:
+        return model, []
+    own = bool(choice.gravity) or not np.array_equal(model.description.gravity, STANDING)
+    if len(good) > 1 or external or own or good[0][0] != left:
+        what, way = (" or ".join(e[i] for e in good) for i in (1, 2))
+        raise RecordingError(f"The {external}torques in {place} are {what}: {way}.")
+    values = {"degrees": lean, "share": left / whole, "before": same / whole, "gravity": down}
+    model = RobotModel(replace(model.description, gravity=np.array([float(x) for x in down.split(",")])))
+    return model, [Note("mounting", values)]
 
 
 def _check_rate(place: Path, time: FloatArray) -> None:
@@ -263,4 +351,4 @@ def _loaded(
         return mass, bias, None
     J = model.ee_jacobian(model.kinematics(q))[:3]
     turning = np.zeros(3) if before is None else (J - before) @ qd / dt
-    return mass + payload * J.T @ J, bias + payload * J.T @ (turning + _GRAVITY), J
+    return mass + payload * J.T @ J, bias + payload * J.T @ (turning - model.gravity), J

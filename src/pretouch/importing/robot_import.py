@@ -46,6 +46,8 @@ class ImportOptions:
     """Joint torque limits [Nm]."""
     ready: tuple[float, ...] = ()
     """Usual posture to start from [rad]; by default one is searched for."""
+    gravity: tuple[float, ...] = (0.0, 0.0, -1.0)
+    """Direction of gravity in the base frame, of any length."""
     capsules: int = MOST
     """Largest number of capsules per link."""
     cover: bool = False
@@ -88,6 +90,7 @@ def import_robot(file: Path, options: ImportOptions) -> Imported:
             limits.tau_max,
             (limits.q_min + limits.q_max) / 2,
             f"imported from {file.name}",
+            gravity=np.array(options.gravity),
         )
         model = RobotModel(description)
         ready = rated(model, np.array(options.ready)) if options.ready else proposed(model, robot.remarks)

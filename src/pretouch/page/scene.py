@@ -44,7 +44,7 @@ class Scene:
         if root:
             self._whole = scene.add_frame(root, show_axes=False, position=(0.0, offset, 0.0))
         else:
-            _draw_room(server, world.floor_height)
+            _draw_room(server, world.floor_height, world.model.gravity)
         surfaces, self.notice = vendor_surfaces(world.model)
         """Sentence on the surfaces of the arm, where they are not the vendor's."""
         self._arm = ArmBody(scene, world.model, world.skin, surfaces or capsule_surfaces(world.model), root)
@@ -187,11 +187,12 @@ def _dashes(world: World, count: int = 80) -> FloatArray:
     return points.reshape(count, 2, 3)
 
 
-def _draw_room(server: ViserServer, floor_height: float) -> None:
-    """Draw floor and sky, and set the visitors' camera."""
+def _draw_room(server: ViserServer, floor_height: float, gravity: FloatArray) -> None:
+    """Draw floor and sky, down where gravity (3,) points, and set the visitors' camera."""
     server.initial_camera.position, server.initial_camera.look_at = CAMERA_FROM, CAMERA_AT
     server.initial_camera.fov = CAMERA_FOV
     scene = server.scene
+    scene.set_up_direction(-gravity)
     scene.configure_default_lights(cast_shadow=False)
     share = np.linspace(0.0, 1.0, 128)[:, None, None]
     top, bottom = np.array([236, 240, 245]), np.array([252, 252, 253])

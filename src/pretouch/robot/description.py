@@ -1,6 +1,7 @@
 """Description of an arm beside its MJCF, in robot.toml: limits, names, a posture and the sources of the figures."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
@@ -17,6 +18,7 @@ FILE = "robot.toml"
 
 _TEXTS = ("name", "mjcf", "ee_body", "source")
 _LISTS = {"qd_max": "rad/s", "qdd_max": "rad/s^2", "tau_max": "Nm", "q_ready": "rad"}
+_MOUNTING = {"gravity": "1"}
 _ENVELOPE = {"offset": "rad/s", "slope": "rad/s^2", "q_upper": "rad", "q_lower": "rad"}
 _LARGEST = 1e6
 """Largest number in a file: a larger one is a mistake."""
@@ -64,6 +66,10 @@ class SpeedEnvelope:
         return replace(self, q_upper=self.q_upper - margin, q_lower=self.q_lower + margin)
 
 
+STANDING = np.array([0.0, 0.0, -1.0])
+"""Direction of gravity in the base frame of an arm that stands."""
+
+
 @dataclass(frozen=True)
 class RobotDescription:
     """An arm of n hinge joints in one chain, described by an MJCF file and its limits.
@@ -88,9 +94,16 @@ class RobotDescription:
     """Source of the limits."""
     envelope: SpeedEnvelope | None = None
     """Speed limits that depend on the position, beside `qd_max`; None if there are none."""
+    gravity: FloatArray = field(default_factory=STANDING.copy)
+    """(3,) direction of gravity in the base frame, of any length: how the arm is mounted."""
 
     def __post_init__(self) -> None:
-        n = len(self.q_ready)
+        n, g = len(self.q_ready), np.asarray(self.gravity, np.float64)
+        if g.shape != (3,) or not np.all(np.isfinite(g)) or not g.any():
+            raise RobotModelError(
+                f"{self.name}: gravity is {g}: give its direction in the base frame, such as 0,0,-1 for an arm that"
+                " stands and 0,0,1 for one that hangs."
+            )
         for name in ("qd_max", "qdd_max", "tau_max"):
             value = getattr(self, name)
             if value.shape != (n,) or not np.all(np.isfinite(value)) or np.any(value <= 0):
@@ -125,11 +138,14 @@ def is_shipped(arm: RobotDescription) -> bool:
     return arm.mjcf.parent == _SHIPPED
 
 
-def robot_named(name: str) -> RobotDescription:
+def robot_named(name: str, gravity: Sequence[float] = ()) -> RobotDescription:
     """Return the description of an arm, by its name or by the folder or robot.toml that it was imported to.
 
-    Raises RobotModelError if there is neither, or if the file is wrong.
+    `gravity` is another direction of gravity than its own. Raises RobotModelError if there is neither, or if the file
+    or the direction is wrong.
     """
+    if gravity:
+        return replace(robot_named(name), gravity=np.array(gravity))
     if name in ROBOTS:
         return ROBOTS[name]()
     if not Path(name).exists():
@@ -151,7 +167,8 @@ def load_description(path: Path | str) -> RobotDescription:
     way_out = f"give {FILE} or its folder, as `pretouch robot import` writes it"
     data = table_of(path, "robot file", RobotModelError, way_out)
     table = data.pop("envelope", None)
-    fields = _fields(path, data, _TEXTS, _LISTS, "envelope")
+    lists = _LISTS | (_MOUNTING if "gravity" in data else {})
+    fields = _fields(path, data, _TEXTS, lists, "gravity", "envelope")
     envelope = {} if table is None else _fields(path, table, ("source",), _ENVELOPE)
     try:
         if envelope:
@@ -166,7 +183,8 @@ def description_text(arm: RobotDescription, mjcf: str = "") -> str:
     texts = {"name": arm.name, "mjcf": mjcf or arm.mjcf.name, "ee_body": arm.ee_body, "source": arm.source}
     e = arm.envelope
     envelope = {} if e is None else {"envelope": _lists(e, _ENVELOPE) | {"source": e.source}}
-    return tomli_w.dumps(texts | _lists(arm, _LISTS) | envelope)
+    mounting = {} if np.array_equal(arm.gravity, STANDING) else _lists(arm, _MOUNTING)
+    return tomli_w.dumps(texts | _lists(arm, _LISTS) | mounting | envelope)
 
 
 def _lists(described: RobotDescription | SpeedEnvelope, names: dict[str, str]) -> dict[str, Any]:

@@ -8,6 +8,9 @@ import numpy as np
 from pretouch.compiled import compiled, kernel
 from pretouch.types import BoolArray, FloatArray, IntArray
 
+G_M_S2 = 9.81
+"""Acceleration by gravity, MuJoCo's default [m/s^2]."""
+
 
 class Hinges(NamedTuple):
     """Tree of the links: each link is fixed to its parent by its joints, in the order of q."""
@@ -51,6 +54,8 @@ class Mechanism(NamedTuple):
 
     arm: ArmTopology
     links: Links
+    upright: Annotated[FloatArray, 3, 3]
+    """(3, 3) turns vectors of the base frame into a frame whose z points against gravity."""
 
 
 class Kinematics(NamedTuple):

@@ -7,6 +7,7 @@ from pretouch.errors import RobotModelError
 from pretouch.robot.body import Capsules, Surface, bodies_of, capsules_of, surface_of
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.kinematics import (
+    G_M_S2,
     ArmTopology,
     Hinges,
     Kinematics,
@@ -38,6 +39,10 @@ class RobotModel:
             ) from error
         self._model.dof_armature[:] = 0.0
         self._model.dof_damping[:] = 0.0
+        upright = _upright(description.gravity)
+        self.gravity: FloatArray = -G_M_S2 * upright[2]
+        """(3,) acceleration by gravity, base frame [m/s^2]."""
+        self._model.opt.gravity[:] = self.gravity
         self._data = mujoco.MjData(self._model)
         self.scratch = self._model, self._data
         """MuJoCo's model and data, for compiled code that calls MuJoCo as the methods here do."""
@@ -68,7 +73,7 @@ class RobotModel:
         middle = np.array([centers[self.body.link == part].mean(axis=0) for part in self.parts])
         mass, com = self._model.body_mass.copy(), self._model.body_ipos.copy()
         self.mechanism = Mechanism(
-            ArmTopology(self.moved_by, self.ee), Links(mass, com, self._inertia(), self.parts, middle)
+            ArmTopology(self.moved_by, self.ee), Links(mass, com, self._inertia(), self.parts, middle), upright
         )
         """Its links, for compiled code."""
         rest = self.kinematics(np.zeros(self.n))
@@ -153,6 +158,20 @@ class RobotModel:
         mass_matrix_into(self.kinematics(q), self.mechanism, mass_matrix)
         return mass_matrix
 
+    def lean(self, gravity: FloatArray) -> float:
+        """Return the angle between its gravity and another one (3,) [degrees]."""
+        along = gravity @ self.gravity / (np.linalg.norm(gravity) * G_M_S2)
+        return float(np.rad2deg(np.arccos(np.clip(along, -1.0, 1.0))))
+
+    def weights(self, q: FloatArray) -> FloatArray:
+        """Compute the torques (n, 3) that hold the arm at q (n,) [rad], by gravity along each base axis [kg m]."""
+        kin, links = self.kinematics(q), self.mechanism.links
+        center = kin.position + np.einsum("kij,kj->ki", kin.rotation, links.com)
+        mass = links.mass[:, None] * self.moved_by
+        # sum of m_k (c_k - p_j) over the links that joint j moves
+        lever = mass.T @ center - mass.sum(axis=0)[:, None] * kin.anchor
+        return np.cross(lever, kin.axis)
+
     def mass_matrix_and_bias(self, q: FloatArray, qd: FloatArray, bias: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Compute the mass matrix (n, n) and, into `bias` (n,), Coriolis plus gravity torques [Nm]."""
         model, data = self._model, self._data
@@ -165,6 +184,15 @@ class RobotModel:
         mass_matrix = np.zeros((self.n, self.n))
         mujoco.mj_fullM(model, data, mass_matrix)
         return mass_matrix, bias
+
+
+def _upright(gravity: FloatArray) -> FloatArray:
+    """Return the rotation (3, 3) of `Mechanism.upright` for a direction of gravity (3,)."""
+    up = -np.asarray(gravity) / np.linalg.norm(gravity)
+    ahead = np.eye(3)[0 if abs(up[0]) < 0.9 else 1]  # x stays horizontal where it can
+    ahead = ahead - (ahead @ up) * up
+    ahead /= np.linalg.norm(ahead)
+    return np.array([ahead, np.cross(up, ahead), up]) + 0.0  # no -0
 
 
 def _hinges(model: mujoco.MjModel) -> Hinges:

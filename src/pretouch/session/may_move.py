@@ -35,6 +35,9 @@ DISTURBANCE_SHARE = 0.5
 """Largest deviation from that mean, averaged over `MEAN_S`, as a share of F_b: more, and somebody touches the arm."""
 MISSING_SHARE = 0.1
 """Largest share of states without a force estimate."""
+MOUNTING_DEG, MOUNTING_SHARE = 10.0, 0.2
+"""Angle of gravity from which an arm is mounted otherwise [degrees]: a tool of 3 kg that nobody told leans it by 6; and
+share of the torques at rest that this may leave."""
 FLOOR_CLEARANCE_M = 0.05
 """Distance that the path keeps from what is below the arm [m]."""
 _NEAR_SHARE = 0.5
@@ -173,6 +176,7 @@ def check(controller: Controller, rest: Standstill, floor: float) -> tuple[Findi
         *_rest(controller, rest),
         *_force(controller, rest),
         *_torques(controller, rest),
+        *_mounting(controller, rest),
         *_floor(controller, floor),
     )
 
@@ -238,6 +242,22 @@ def _torques(controller: Controller, rest: Standstill) -> Iterator[Finding]:
             "no torques",
             f"The robot gives no external joint torques in {100 * missing:.0f}% of its states, and the profile"
             f" {profile.name} needs them: check that its driver estimates them, or choose another profile.",
+        )
+
+
+def _mounting(controller: Controller, rest: Standstill) -> Iterator[Finding]:
+    model, torque = controller.model, rest.rest_torque
+    weights = model.weights(rest.newest.q)
+    # a robot takes for external the torque of the gravity that it knows less that of the true one
+    error = np.linalg.lstsq(weights, np.nan_to_num(torque))[0]
+    gravity, left = model.gravity - error, np.linalg.norm(torque - weights @ error)
+    size = np.linalg.norm(gravity) / np.linalg.norm(model.gravity)
+    if model.lean(gravity) > MOUNTING_DEG and 0.7 < size < 1.3 and left < MOUNTING_SHARE * np.linalg.norm(torque):
+        yield _fault(
+            "mounting",
+            f"At rest the robot's external torques are those of an arm whose gravity points along {vector(gravity)}"
+            f" m/s^2 in its base frame, not {vector(model.gravity)}: tell the robot how it is mounted, or give"
+            " --gravity.",
         )
 
 

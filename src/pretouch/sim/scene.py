@@ -134,6 +134,7 @@ def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel
 def _arm(model: RobotModel, error: ArmError) -> tuple[mujoco.MjSpec, list[str], list[str]]:
     """Return an arm without its actuators and with what it carries; and the names of its geoms that move, and not."""
     mj = mujoco.MjSpec.from_file(str(model.description.mjcf))
+    mj.option.gravity = model.gravity
     for actuator in list(mj.actuators):
         mj.delete(actuator)
     for joint in mj.joints:

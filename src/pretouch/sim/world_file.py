@@ -33,7 +33,7 @@ def attach_world(arm: mujoco.MjSpec, file: Path) -> None:
         raise ParameterError(f"The scene {file} cannot be read as MJCF: {reason}") from None
     _check(alone, file)
     frame = arm.worldbody.add_frame()
-    frame.pos, frame.quat = _in_base(alone, file)
+    frame.pos, frame.quat = _in_base(alone, file, arm.option.gravity)
     _settle_differences(world, arm)
     arm.attach(world, prefix=_PREFIX, frame=frame)
 
@@ -51,20 +51,23 @@ def _check(alone: mujoco.MjModel, file: Path) -> None:
             )
 
 
-def _in_base(alone: mujoco.MjModel, file: Path) -> tuple[FloatArray, FloatArray]:
-    """Return origin [m] and quaternion of the file's world in the frame of the arm's base."""
-    position, quat = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-    site = mujoco.mj_name2id(alone, mujoco.mjtObj.mjOBJ_SITE, _BASE)
-    if site < 0:
-        return position, quat
-    data = mujoco.MjData(alone)
+def _in_base(alone: mujoco.MjModel, file: Path, gravity: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return origin [m] and quaternion of the file's world in the frame of the arm's base, which has this gravity."""
+    data, position, quat, turned = mujoco.MjData(alone), np.zeros(3), np.empty(4), np.eye(3)
     mujoco.mj_kinematics(alone, data)
-    if alone.body_weldid[alone.site_bodyid[site]] or data.site_xmat[site, 8] < 1.0 - _UPRIGHT:
-        raise ParameterError(f"The site {_BASE} of the scene {file} moves or is tilted: the arm stands still, upright.")
-    turned = np.empty(4)
-    mujoco.mju_mat2Quat(turned, data.site_xmat[site])
-    mujoco.mju_negPose(position, quat, data.site_xpos[site], turned)
-    return position, quat
+    site = mujoco.mj_name2id(alone, mujoco.mjtObj.mjOBJ_SITE, _BASE)
+    if site >= 0:
+        position, turned = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)
+    tilted = np.linalg.norm(turned.T @ alone.opt.gravity - gravity) > _UPRIGHT * np.linalg.norm(gravity)
+    if tilted or (site >= 0 and alone.body_weldid[alone.site_bodyid[site]]):
+        raise ParameterError(
+            f"The site {_BASE} of the scene {file} moves or is tilted: the arm stands still, with gravity along"
+            f" {gravity.round(2)} in its base frame."
+        )
+    mujoco.mju_mat2Quat(quat, turned.ravel())
+    of_world = np.empty(3), np.empty(4)
+    mujoco.mju_negPose(*of_world, position, quat)
+    return of_world
 
 
 def _settle_differences(world: mujoco.MjSpec, arm: mujoco.MjSpec) -> None:

@@ -76,7 +76,7 @@ class RunSetup:
 def run_setup(arm: ArmOptions, robot: RobotOptions, units: SkinOptions, task: TaskOptions) -> RunSetup:
     """Read files and parameters; what does not fit together is an error."""
     profile = find_profile(task.profile)
-    model = RobotModel(arm.described(robot_named(robot.arm)))
+    model = RobotModel(arm.described(robot_named(robot.arm, robot.gravity)))
     if units.no_skin:
         if profile.perception is not None:
             raise ParameterError(
