@@ -13,7 +13,7 @@ from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.reaction import DecayingVelocity
 from pretouch.contact.window import Window, add_force, window_init
 from pretouch.errors import RecordingError
-from pretouch.imported_data.log import Note
+from pretouch.imported_data.log import GAP_S, Note, gaps, pieces
 from pretouch.imported_data.reading import ForceRecording
 from pretouch.imported_data.results import (
     AROUND_S,
@@ -27,7 +27,7 @@ from pretouch.imported_data.results import (
     over,
     result_of,
 )
-from pretouch.imported_data.torques import GAP_S, TorqueRecording, gaps, pieces
+from pretouch.imported_data.torques import TorqueRecording
 from pretouch.modes import Event, mode_init, next_mode
 from pretouch.params import SequentialParams
 from pretouch.profiles import Profile

@@ -25,6 +25,8 @@ _OUT_OF_RANGE_RAD = 0.5
 """Joint positions this far beyond the arm's range [rad] are of another unit or arm."""
 _TWO_TURNS_RAD = 12.5
 """Range from which a joint may turn without end [rad]: `pretouch robot import` gives an endless one two turns."""
+GAP_S = 0.1
+"""Time without a sample after which a recording begins anew [s]."""
 _NUMBERED = re.compile(r"(.*?)(\d{1,2})(\D*)")
 
 
@@ -210,6 +212,20 @@ def check_steps_back(place: Path, time: IntArray, where: Callable[[int], str]) -
             f"{place}, {where(first)}: the time goes back by {back[first]:.3g} s: give one recording, cut to a part in"
             " which time never goes back."
         )
+
+
+def gaps(time: FloatArray, longer_s: float = GAP_S) -> list[Note]:
+    """Say what gaps longer than so much there are between instants (N,) [s]."""
+    steps = np.diff(time)
+    some = steps[steps > longer_s]
+    sizes = {"count": len(some), "longer_s": longer_s, "seconds": float(some.sum())}
+    return [Note("gaps", sizes)] if len(some) else []
+
+
+def pieces(time: FloatArray, gap_s: float = GAP_S) -> list[slice]:
+    """Stretches without a gap of instants (N,) [s]."""
+    ends = np.flatnonzero(np.diff(time) > gap_s) + 1
+    return [slice(int(a), int(b)) for a, b in zip([0, *ends], [*ends, len(time)], strict=True)]
 
 
 def interpolated(log: Log, kind: str, ticks: IntArray, longest_s: float) -> FloatArray:

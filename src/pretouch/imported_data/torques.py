@@ -7,7 +7,7 @@ import numpy as np
 import scipy  # its parts load when they are first used: a quarter of a second that a help does not wait
 
 from pretouch.errors import RecordingError
-from pretouch.imported_data.log import TORQUES, Choice, ImportedRecording, Log, Note, check_reach, listed
+from pretouch.imported_data.log import TORQUES, Choice, ImportedRecording, Log, Note, check_reach, gaps, listed, pieces
 from pretouch.params import SequentialParams
 from pretouch.robot.description import STANDING
 from pretouch.robot.kinematics import G_M_S2
@@ -34,8 +34,6 @@ _LIGHT, _HEAVY = 0.5, 1.5
 _SAMPLES = 400
 """How many samples are looked at."""
 _THOUSAND = (300.0, 3000.0)
-GAP_S = 0.1
-"""Time without a sample after which a recording begins anew [s]."""
 _LEAST_HZ = 40.0
 """Rate below which nothing is detected [Hz]."""
 _OVER_S = 0.04
@@ -285,20 +283,6 @@ def _check_rate(place: Path, time: FloatArray) -> None:
             f"The samples of {place} come at {rate:.3g} Hz: record at {_LEAST_HZ:g} Hz or more, or check the unit of"
             " the time."
         )
-
-
-def gaps(time: FloatArray, longer_s: float = GAP_S) -> list[Note]:
-    """Say what gaps longer than so much there are between instants (N,) [s]."""
-    steps = np.diff(time)
-    some = steps[steps > longer_s]
-    sizes = {"count": len(some), "longer_s": longer_s, "seconds": float(some.sum())}
-    return [Note("gaps", sizes)] if len(some) else []
-
-
-def pieces(time: FloatArray, gap_s: float = GAP_S) -> list[slice]:
-    """Stretches without a gap of instants (N,) [s]."""
-    ends = np.flatnonzero(np.diff(time) > gap_s) + 1
-    return [slice(int(a), int(b)) for a, b in zip([0, *ends], [*ends, len(time)], strict=True)]
 
 
 def velocities(time: FloatArray, q: FloatArray) -> FloatArray:
