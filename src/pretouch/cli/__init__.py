@@ -10,6 +10,7 @@ import tyro
 from rich.console import Console
 
 from pretouch.cli.app import COMMANDS, Command, command_class, command_names, overview, split_name
+from pretouch.cli.options import REGISTRY
 from pretouch.errors import PluginError, PretouchError
 from pretouch.signals import Terminated, ends_raise, exit_code
 
@@ -49,7 +50,7 @@ def _read(args: Sequence[str], errors: Console) -> Command:
     if kind is not None:
         if hasattr(kind, "of_words"):  # its options depend on what the first words name
             kind, words, name = kind.of_words(words)
-        return cast(Command, tyro.cli(kind, prog=f"pretouch {name}", args=words, config=_CONFIG))
+        return cast(Command, tyro.cli(kind, prog=f"pretouch {name}", args=words, config=_CONFIG, registry=REGISTRY))
     below = [each for each in names if each.startswith(f"{name} ")]
     if name in ("", "-h", "--help") or (below and (not words or words[0] in ("-h", "--help"))):
         listed = below or names

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from pretouch.atomic_write import atomic_write
 from pretouch.cli.detect_words import guidance, read_from, sentences, shown
-from pretouch.cli.options import JsonFile, Numbers, OptionalFile, Words
+from pretouch.cli.options import JsonFile, OptionalFile, Words
 from pretouch.cli.tables import show
 from pretouch.cli.writing import check_writable, numbers_to, unwritable_said
 from pretouch.errors import ParameterError, RecordingError
@@ -46,11 +46,6 @@ class Detect(Choice):
     arm: str = field(default="auto", kw_only=True)
     """The arm: panda, fr3, or the folder of `pretouch robot import`; auto: by the names of its joints, otherwise a
     Panda."""
-    gains: Numbers = field(default=(), kw_only=True)
-    """Torque by motor current of each joint, gear and sign included [Nm/A], separated by commas: for current1_A."""
-    gravity: Numbers = field(default=(), kw_only=True)
-    """Direction of gravity in the arm's base frame, of any length: 0,0,1 for an arm that hangs, 0,0,-1 for one that
-    stands; by default the arm's own, or the one that measured torques tell."""
     rate: float = 0.0
     """Rate of the detector [Hz]; by default the profile's own, 100."""
     out: OptionalFile = None

@@ -1,9 +1,9 @@
 """Types of options, groups of options that several commands have, and the word that names an arm."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar, get_args
 
 import tyro
 from tyro.constructors import PrimitiveConstructorSpec
@@ -15,8 +15,23 @@ from pretouch.units import HOST, PORT
 A = TypeVar("A", bound=ArmOptions)
 
 
-def _listed(kind: Callable[[str], Any], metavar: str, noun: str) -> PrimitiveConstructorSpec[tuple[Any, ...]]:
-    """Return how tyro reads values between commas."""
+Words, Paths, Numbers, Counts = tuple[str, ...], tuple[Path, ...], tuple[float, ...], tuple[int, ...]
+_LISTED = {
+    str: ("A,B,...", "words"),
+    Path: ("A,B,...", "folders"),
+    float: ("X,Y,...", "numbers"),
+    int: ("N,N,...", "whole numbers"),
+}
+REGISTRY = tyro.constructors.ConstructorRegistry()
+"""How tyro reads tuples of any length: as values between commas."""
+
+
+@REGISTRY.primitive_rule
+def _listed(info: tyro.constructors.PrimitiveTypeInfo) -> PrimitiveConstructorSpec[tuple[Any, ...]] | None:
+    kind, *rest = get_args(info.type) or (None,)
+    if info.type_origin is not tuple or rest != [...]:
+        return None
+    metavar, noun = _LISTED[kind]
 
     def read(words: list[str]) -> tuple[Any, ...]:
         try:
@@ -33,14 +48,6 @@ def _listed(kind: Callable[[str], Any], metavar: str, noun: str) -> PrimitiveCon
     )
 
 
-Words = Annotated[tuple[str, ...], _listed(str, "A,B,...", "words")]
-"""Words between commas."""
-Paths = Annotated[tuple[Path, ...], _listed(Path, "A,B,...", "folders")]
-"""Folders between commas."""
-Numbers = Annotated[tuple[float, ...], _listed(float, "X,Y,...", "numbers")]
-"""Numbers between commas."""
-Counts = Annotated[tuple[int, ...], _listed(int, "N,N,...", "whole numbers")]
-"""Whole numbers between commas."""
 OptionalFile = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
 """A file, or none."""
 JsonFile = Annotated[

@@ -8,7 +8,7 @@ from typing import Any
 import tyro
 from rich.console import Console
 
-from pretouch.cli.options import JsonFile, Numbers, OptionalFile, Paths
+from pretouch.cli.options import JsonFile, OptionalFile
 from pretouch.cli.tables import show
 from pretouch.cli.writing import numbers_to
 from pretouch.errors import RobotModelError
@@ -36,19 +36,6 @@ class ImportArm(ImportOptions):
     """URDF file (not a xacro template) or MJCF file."""
     out: OptionalFile = None
     """Folder to write robot.toml and arm.xml to; by default the arm's name."""
-    package_path: Paths = ()
-    """Folders that hold the ROS packages of package:// paths, separated by commas; those above the file are
-    searched in any case."""
-    qd_max: Numbers = ()
-    """Joint velocity limits [rad/s], one for all or one per joint, separated by commas; by default the file's."""
-    qdd_max: Numbers = ()
-    """Joint acceleration limits [rad/s^2]; no file has them."""
-    tau_max: Numbers = ()
-    """Joint torque limits [Nm]; by default the file's."""
-    ready: Numbers = ()
-    """Usual start posture [rad], one position per joint, separated by commas; by default one is searched for."""
-    gravity: Numbers = (0.0, 0.0, -1.0)
-    """Direction of gravity in the base frame, of any length: 0,0,1 for an arm that hangs."""
     json: JsonFile = None
 
     def run(self) -> None:

@@ -51,11 +51,12 @@ class Choice:
     arm: str | RobotModel = "auto"
     """The arm, or its name or the folder it was imported to; auto: by the names of its joints, otherwise a Panda."""
     gravity: tuple[float, ...] = ()
-    """(3,) direction of gravity in the arm's base frame; by default the arm's own, or what measured torques tell."""
+    """Direction of gravity in the arm's base frame, of any length: 0,0,1 for an arm that hangs; by default the arm's
+    own, or the one that measured torques tell."""
     columns: str = ""
     """Columns of other names, THEIRS=OURS separated by commas: tau_J_0=tau1_Nm; tau_J_*=tau*_Nm is all joints."""
     gains: tuple[float, ...] = ()
-    """Torque of each joint by its motor's current [Nm/A], negative where the motor counts the other way."""
+    """Torque of each joint by its motor's current, gear and sign included [Nm/A]: for current1_A."""
     payload: float = 0.0
     """Load at the end-effector that the arm's model does not have [kg]: for measured torques."""
 

@@ -37,17 +37,17 @@ class ImportOptions:
     name: str = ""
     """Name of the arm; by default the file's."""
     package_path: tuple[Path, ...] = ()
-    """Folders that hold ROS packages."""
+    """Folders that hold the ROS packages of package:// paths; those above the file are searched in any case."""
     qd_max: tuple[float, ...] = ()
-    """Joint velocity limits [rad/s]: one for all, or one for each."""
+    """Joint velocity limits [rad/s], one for all or one for each; by default the file's."""
     qdd_max: tuple[float, ...] = ()
-    """Joint acceleration limits [rad/s^2]."""
+    """Joint acceleration limits [rad/s^2]; no file has them."""
     tau_max: tuple[float, ...] = ()
-    """Joint torque limits [Nm]."""
+    """Joint torque limits [Nm]; by default the file's."""
     ready: tuple[float, ...] = ()
-    """Usual posture to start from [rad]; by default one is searched for."""
+    """Usual posture to start from [rad], one position for each joint; by default one is searched for."""
     gravity: tuple[float, ...] = (0.0, 0.0, -1.0)
-    """Direction of gravity in the base frame, of any length."""
+    """Direction of gravity in the base frame, of any length: 0,0,1 for an arm that hangs."""
     capsules: int = MOST
     """Largest number of capsules per link."""
     cover: bool = False
