@@ -16,6 +16,7 @@ from pretouch.robot.kinematics import (
     jacobian_into,
     mass_matrix_into,
     place,
+    tangents_of,
 )
 from pretouch.types import BoolArray, FloatArray, IntArray
 
@@ -39,8 +40,10 @@ class RobotModel:
             ) from error
         self._model.dof_armature[:] = 0.0
         self._model.dof_damping[:] = 0.0
-        upright = _upright(description.gravity)
-        self.gravity: FloatArray = -G_M_S2 * upright[2]
+        upright = np.empty((3, 3))
+        upright[2] = 0.0 - description.gravity / np.linalg.norm(description.gravity)
+        tangents_of(upright[2], upright[:2])
+        self.gravity: FloatArray = 0.0 - G_M_S2 * upright[2]
         """(3,) acceleration by gravity, base frame [m/s^2]."""
         self._model.opt.gravity[:] = self.gravity
         self._data = mujoco.MjData(self._model)
@@ -184,15 +187,6 @@ class RobotModel:
         mass_matrix = np.zeros((self.n, self.n))
         mujoco.mj_fullM(model, data, mass_matrix)
         return mass_matrix, bias
-
-
-def _upright(gravity: FloatArray) -> FloatArray:
-    """Return the rotation (3, 3) of `Mechanism.upright` for a direction of gravity (3,)."""
-    up = -np.asarray(gravity) / np.linalg.norm(gravity)
-    ahead = np.eye(3)[0 if abs(up[0]) < 0.9 else 1]  # x stays horizontal where it can
-    ahead = ahead - (ahead @ up) * up
-    ahead /= np.linalg.norm(ahead)
-    return np.array([ahead, np.cross(up, ahead), up]) + 0.0  # no -0
 
 
 def _hinges(model: mujoco.MjModel) -> Hinges:
