@@ -15,7 +15,10 @@ from pretouch.units import HOST, PORT
 A = TypeVar("A", bound=ArmOptions)
 
 
-Words, Paths, Numbers, Counts = tuple[str, ...], tuple[Path, ...], tuple[float, ...], tuple[int, ...]
+Words = tuple[str, ...]
+Paths = tuple[Path, ...]
+Numbers = tuple[float, ...]
+Counts = tuple[int, ...]
 _LISTED = {
     str: ("A,B,...", "words"),
     Path: ("A,B,...", "folders"),

@@ -268,9 +268,9 @@ def _mounted(
         return model, []
     own = bool(choice.gravity) or not np.array_equal(model.description.gravity, STANDING)
     if len(good) > 1 or external or own or good[0][0] != left:
-        what, way = (" or ".join(e[i] for e in good) for i in (1, 2))
+        what, way = (" or ".join(str(e[i]) for e in good) for i in (1, 2))
         raise RecordingError(f"The {external}torques in {place} are {what}: {way}.")
-    values = {"degrees": lean, "share": left / whole, "before": same / whole, "gravity": down}
+    values: dict[str, float | str] = {"degrees": lean, "share": left / whole, "before": same / whole, "gravity": down}
     model = RobotModel(replace(model.description, gravity=np.array([float(x) for x in down.split(",")])))
     return model, [Note("mounting", values)]
 

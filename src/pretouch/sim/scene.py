@@ -183,8 +183,8 @@ def _add_objects(mj: mujoco.MjSpec, spec: SceneSpec) -> dict[str, float]:
         stiffness[thing.name] = thing.stiffness
     if spec.hand:
         body = world.add_body(name="hand", pos=spec.hand.start, gravcomp=1.0)
-        for axis in np.eye(3):
-            body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+        for along in np.eye(3):
+            body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=along)
         body.add_geom(name="hand", type=kind.mjGEOM_SPHERE, size=[spec.hand.radius, 0, 0], mass=spec.hand.mass, **off)
         stiffness["hand"] = spec.hand.stiffness
     if spec.ghost:  # in no pair, so it touches nothing

@@ -9,8 +9,9 @@ from dataclasses import field
 import numpy as np
 
 from pretouch.imported_data.detect import cycles, detect
+from pretouch.imported_data.log import GAP_S
 from pretouch.imported_data.results import TorqueCourse
-from pretouch.imported_data.torques import GAP_S, TorqueRecording
+from pretouch.imported_data.torques import TorqueRecording
 from pretouch.params import TaskParams
 from pretouch.profiles import profile
 from pretouch.recording.compare import DetectedContact
