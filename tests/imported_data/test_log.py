@@ -24,7 +24,8 @@ def log(panda_model):
 
     def made(times, values=None):
         numbers = np.arange(len(times), dtype=np.float64) if values is None else values
-        return Log(PLACE, panda_model, np.array(times, dtype=np.int64), {"force": numbers[:, None]}, {})
+        rows = np.arange(1, len(times) + 1)
+        return Log(PLACE, panda_model, np.array(times, dtype=np.int64), rows, "row {}", {"force": numbers[:, None]}, {})
 
     return made
 
@@ -47,7 +48,9 @@ def test_rows_that_are_no_numbers_are_left_out_where_asked_and_counted(log):
     ordered = rows.in_order("force")
     assert ordered.time.tolist() == [1, 3]
     assert [(note.code, note.values["count"]) for note in ordered.notes] == [("not_finite", 2)]
-    with pytest.raises(RecordingError, match=r"mine\.csv has 2 samples, and 1 of them is usable: give a longer"):
+    with pytest.raises(
+        RecordingError, match=r"mine\.csv has 2 samples, and 1 of them is usable, 1 repeated: give a longer"
+    ):
         log([5, 5]).in_order()
 
 

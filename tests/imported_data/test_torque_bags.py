@@ -51,7 +51,7 @@ def external(moving, topic="/broadcaster/external_joint_torques", names=PANDA):
 def test_efforts_of_joint_states_are_measured_torques_whatever_the_order_of_names(tmp_path, short):
     fingers = [("/joint_states", t, joints(t, [0.01], ["finger_joint1"], [0.0], [0.0])) for t in of_motion(short)]
     bag = write_bag(tmp_path / "bag", by_time(measured(short, order=[2, 1, 0, 6, 5, 4, 3]), fingers))
-    assert open_log(bag, Choice()).kinds == {"q", "tau"}
+    assert open_log(bag, Choice()).kinds == {"q"}
     recording = torques_of(bag)
     np.testing.assert_allclose(recording.q, short.q)
     np.testing.assert_allclose(recording.qd, short.qd)
@@ -82,7 +82,7 @@ def test_beside_a_force_only_what_is_surely_torques_counts(tmp_path, short):
 @pytest.mark.parametrize(
     ("messages", "choice", "words"),
     [
-        (lambda m: external(m), {}, "has no topic of sensor_msgs/JointState"),
+        (lambda m: external(m), {}, "has joint torques, on /broadcaster/.*, but no joint positions"),
         (lambda m: by_time(measured(m), measured(m, "/other")), {}, "several topics of .*: choose one by --torques"),
         (lambda m: measured(m), {"torques": "/gone"}, "has no topic '/gone' of sensor_msgs/JointState"),
         (lambda m: measured(m), {"joints": "/gone"}, "has no topic '/gone' of sensor_msgs/JointState: choose --joints"),

@@ -85,7 +85,7 @@ def _by_torques(kinds: frozenset[str], choice: Choice, profiles: Sequence[Profil
     by_force = profiles is not None and not any(p.detect.by_torques for p in profiles)
     if choice.frame == "ee" or choice.wrench or (by_force and "force" in kinds):
         return False
-    return bool(kinds.intersection(TORQUES)) or ("q" in kinds and "force" not in kinds)
+    return bool(kinds.intersection(TORQUES)) or ("force" not in kinds and bool(kinds & {"q", "dq"}))
 
 
 @dataclass(frozen=True)
@@ -116,6 +116,7 @@ class _Results:
             "arm": r.model.description.name,
             "assumed": read_from(r),
             "notes": self.notes,
+            "data": r.notes,
             "samples": len(r.time),
             "first_sample_s": r.first_s,
             "duration_s": r.time[-1],

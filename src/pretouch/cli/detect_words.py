@@ -10,15 +10,29 @@ from pretouch.imported_data.results import DetectorResult
 from pretouch.imported_data.torques import TorqueRecording
 
 _SENTENCES = {
-    "no_time": "{rows} {have} no time and {were} left out.",
+    "no_time": "{rows} {have} no time and {were} left out, the first at {first}.",
     "unused": "Columns that are not used: {names}.",
-    "no_stamps": "Some headers have no stamp, so the times of recording are used.",
-    "not_finite": "{samples} not finite numbers and left out.",
-    "sorted": "{what}: the time went backwards {times}; the samples were sorted.",
-    "repeated": "{what}: a stamp was repeated {times}; the later sample counts.",
-    "no_estimate": "Force: {samples} not finite and count as no estimate.",
-    "zeros_missing": "Force: {samples} all zeros and count as no estimate (--zeros kept).",
-    "zeros_kept": "Force: {samples} all zeros, which on a Franka arm means no estimate (--zeros missing).",
+    "dates": "{column} holds dates: times are seconds since 1970, by UTC where no zone stands with them.",
+    "cut": "The file is cut short or damaged: what can be read before that is used.",
+    "fault": "A topic is not used: {reason}.",
+    "no_stamps": "Some headers have no stamp, so the times of recording are used (otherwise --stamps headers).",
+    "headers_back": "The stamps of the headers do not go on, so the times of recording are used (otherwise --stamps"
+    " headers).",
+    "pace": "The clock of the headers runs at {pace:.3g} times the pace of the recording's: the headers are used"
+    " (otherwise --stamps recording).",
+    "wraps": "The time began anew after {period:.9g} s {times}, first at {first}, as a clock does that is too small: it"
+    " was made to go on.",
+    "zeros": "{rows} {have} zeros at all joints, which is no measurement, and {were} left out, the first at {first}.",
+    "repeats": "{rows} {repeat} the one before to the last digit for long, which is no measurement, and {were} left"
+    " out, the first at {first}.",
+    "not_finite": "{samples} not finite numbers and left out, the first at {first}.",
+    "sorted": "The time went backwards {times}, first at {first}, by less than messages overtake each other; the"
+    " samples were sorted.",
+    "repeated": "A stamp was repeated {times}, first at {first}; the later sample counts.",
+    "no_estimate": "Force: {samples} not finite and count as no estimate, the first at {first}.",
+    "zeros_missing": "Force: {samples} all zeros and count as no estimate (--zeros kept), the first at {first}.",
+    "zeros_kept": "Force: {samples} all zeros, the first at {first}, which on a Franka arm means no estimate (--zeros"
+    " missing).",
     "looks_ee": "The force's frame_id is {frame!r}: if that is the end-effector's, add --frame ee.",
     "gaps": "{gaps} of more than {longer_s:g} s without a sample, {seconds:.2f} s in all.",
     "no_motion": "No joint moves: sign and unit of the velocities cannot be checked.",
@@ -58,6 +72,7 @@ def sentence(note: Note) -> str:
     words = {
         "rows": "1 row" if one else f"{count} rows",
         "have": "has" if one else "have",
+        "repeat": "repeats" if one else "repeat",
         "were": "was" if one else "were",
         "samples": "1 sample is" if one else f"{count} samples are",
         "times": "once" if one else f"{count} times",

@@ -1,7 +1,7 @@
 """A log of another program: what stands in it by kind, in SI units but in its own sign and frame."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -11,7 +11,8 @@ import numpy as np
 from pretouch.errors import RecordingError
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.types import FloatArray, IntArray
+from pretouch.traces import spans
+from pretouch.types import BoolArray, FloatArray, IntArray
 from pretouch.values import value
 
 TORQUES = ("tau_ext", "tau", "current")
@@ -21,6 +22,17 @@ TABLES = (".csv", ".tsv", ".txt")
 PARQUET = ".parquet"
 _LATE_S = 0.5
 """How far a stamp may lie before an earlier one [s]: messages overtake each other by less, two recordings by more."""
+_COUNTERS_S = tuple(2**bits * tick for bits in (16, 24, 32) for tick in (1e-9, 1e-6, 1e-5, 1e-4, 1e-3))
+"""Times after which counters of 16, 24 and 32 bits begin anew [s]."""
+_CLOCKS_S = (1.0, 60.0, 3600.0, 43_200.0, 86_400.0, 604_800.0)
+"""Times after which clocks without a date do [s], as the seconds of a minute or of a week."""
+_WRAP_S = 0.1
+"""Longest time without a sample over which a clock that begins anew goes on [s]."""
+_REPEATED_S, _TURNED_RAD = 0.5, 0.1
+"""Time for which values that repeat to the last digit are no measurement [s], and how far from its neighbours in time
+a posture is which the arm did not have [rad]."""
+_MOVING_RAD_S = 0.02
+"""Speed of a joint at which its position cannot stay the same [rad/s]."""
 _OUT_OF_RANGE_RAD = 0.5
 """Joint positions this far beyond the arm's range [rad] are of another unit or arm."""
 _TWO_TURNS_RAD = 12.5
@@ -45,6 +57,8 @@ class Choice:
     """Topic of the force, if there are several."""
     joints: str = ""
     """Topic of the joint positions, if there are several."""
+    stamps: Literal["auto", "headers", "recording"] = "auto"
+    """Times of the messages of a bag: of their headers, or of the recording; auto: of the headers, if they go on."""
     torques: str = ""
     """Topic of the joint torques: JointState with efforts, FrankaState or FrankaRobotState; by default the one that the
     recording has."""
@@ -78,6 +92,10 @@ class Log:
     """The arm whose joints these are."""
     time: IntArray
     """(N,) [ns], of any clock."""
+    rows: IntArray
+    """(N,) numbers of the lines, rows or messages."""
+    row: str
+    """Name of one of them, as `line {}`."""
     arrays: dict[str, FloatArray]
     """By kind, NaN where there is no value: `force` (N, 3) [N], `torque` (N, 3) [Nm]; of the n joints of the model, in
     its order, `q`, `dq`, `dq_d`, `tau_ext`, `tau` (N, n) [rad, rad/s, Nm] and `current` [A]."""
@@ -92,36 +110,99 @@ class Log:
     def __len__(self) -> int:
         return len(self.time)
 
-    def at(self, rows: IntArray) -> "Log":
-        """Return some of its samples."""
-        return replace(self, time=self.time[rows], arrays={kind: values[rows] for kind, values in self.arrays.items()})
+    @property
+    def usual_s(self) -> float:
+        """Median time between two samples whose times are not the same [s]."""
+        steps = np.diff(self.time)
+        return float(np.median(steps[steps > 0])) / 1e9 if (steps > 0).any() else 0.0
 
     def noted(self, *notes: Note) -> "Log":
         """Return it with further notes."""
         return replace(self, notes=(*self.notes, *notes))
 
-    def in_order(self, *finite: str) -> "Log":
-        """Return it by time without doubles, the later of two counting, and without rows that are not finite in kinds.
+    def counted(self, code: str, which: BoolArray, **more: float) -> list[Note]:
+        """Note how many samples (N,) are of a kind, and the first of them; nothing where there is none."""
+        count = int(np.count_nonzero(which))
+        return [Note(code, {"count": count, "first": self._where(int(np.argmax(which))), **more})] if count else []
 
-        Raises RecordingError if fewer than two samples are left.
+    def at(self, rows: IntArray) -> "Log":
+        """Return some of its samples."""
+        arrays = {kind: values[rows] for kind, values in self.arrays.items()}
+        return replace(self, time=self.time[rows], rows=self.rows[rows], arrays=arrays)
+
+    def without(self, code: str, which: BoolArray) -> "Log":
+        """Return it without some of its samples (N,), and note how many these are."""
+        return self.at(np.flatnonzero(~which)).noted(*self.counted(code, which)) if which.any() else self
+
+    def forward(self) -> "Log":
+        """Return it with the wraps of its clock undone. RecordingError where its time goes back: it begins anew."""
+        time, period = unwrapped(self.time)
+        back = _back(time) > _LATE_S
+        if back.any():
+            i = int(np.argmax(back))
+            raise RecordingError(
+                f"{self.place}, {self._where(i)}: the time goes back by {_back(time)[i]:.3g} s: give one recording, cut"
+                " to a part in which time never goes back."
+            )
+        wraps = np.append(False, np.diff(time) != np.diff(self.time))
+        return replace(self, time=time).noted(*self.counted("wraps", wraps, period=period))
+
+    def in_order(self, *kinds: str) -> "Log":
+        """Return its measurements by time, the later of two at one instant counting, all of them finite in some kinds.
+
+        Left out are also values that are none: zeros of all joints, and what repeats itself while the arm moves. Raises
+        RecordingError if its time goes back or stands still, or fewer than two samples are left.
         """
-        log, what = self, "Force" if "force" in self.arrays else "Joints"
-        if finite:
-            usable = np.isfinite(np.hstack([self.arrays[kind] for kind in finite])).all(axis=1)
-            if without := int(np.count_nonzero(~usable)):
-                log = log.at(np.flatnonzero(usable)).noted(Note("not_finite", {"count": without}))
-        steps = np.diff(log.time)
-        if backwards := int(np.count_nonzero(steps < 0)):
-            log = log.at(np.argsort(log.time, kind="stable")).noted(Note("sorted", {"what": what, "count": backwards}))
-        last = np.append(np.diff(log.time) > 0, True)[: len(log)]
-        if doubles := int(np.count_nonzero(~last)):
-            log = log.at(np.flatnonzero(last)).noted(Note("repeated", {"what": what, "count": doubles}))
+        log = self.forward()
+        for code, mask in (("zeros", Log._zeros), ("repeats", Log._repeats)):
+            for kind in sorted({*(kinds or self.arrays)} & {"force", "q", *TORQUES}):
+                log = log.without(code, mask(log, kind))
+        if kinds:
+            finite = np.isfinite(np.hstack([log.arrays[kind] for kind in kinds]))
+            log = log.without("not_finite", np.asarray(~finite.all(axis=1)))
+        if notes := log.counted("sorted", np.append(False, np.diff(log.time) < 0)[: len(log)]):
+            log = log.at(np.argsort(log.time, kind="stable")).noted(*notes)
+        doubles = np.append(np.diff(log.time) == 0, False)[: len(log)]
+        for begin, end in spans(doubles):
+            if (end - begin) * log.usual_s > _LATE_S:
+                raise RecordingError(
+                    f"{self.place}, {log._where(begin)}: the time stands still for {end - begin + 1} samples: give a"
+                    " time of its own for each."
+                )
+        log = log.without("repeated", doubles)
         if len(log) < 2:
+            lost = [f", {n.values['count']} {n.code.replace('_', ' ')}" for n in log.notes if "count" in n.values]
             raise RecordingError(
                 f"{self.place} has {len(self)} samples, and {len(log)} of them {'is' if len(log) == 1 else 'are'}"
-                " usable: give a longer recording, of finite numbers and with a time of its own for each sample."
+                f" usable{''.join(lost)}: give a longer recording, of finite numbers and with a time of its own for"
+                " each sample."
             )
         return log
+
+    def _where(self, i: int) -> str:
+        return self.row.format(self.rows[i])
+
+    def _zeros(self, kind: str) -> BoolArray:
+        """Mask of samples (N,) in which all joints are at zero, where they cannot have been, or have no torque."""
+        values = self.arrays[kind]
+        zero = np.asarray(~values.any(axis=1))
+        if kind == "q":
+            for begin, end in spans(zero):
+                beside = np.abs(values[[i for i in (begin - 1, end) if 0 <= i < len(self)]])
+                zero[begin:end] = not len(beside) or (beside.max(axis=1) > _TURNED_RAD).any()
+        return zero if kind in ("q", "tau", "current") else np.zeros(len(self), np.bool_)
+
+    def _repeats(self, kind: str) -> BoolArray:
+        """Mask of samples (N,) that repeat the one before, to the last digit and for long, and cannot have."""
+        values, q, dq = self.arrays[kind], self.arrays.get("q"), self.arrays.get("dq")
+        same = np.append(False, (values[1:] == values[:-1]).all(axis=1) & values[1:].any(axis=1))[: len(self)]
+        for begin, end in spans(same):
+            lasts = (end - begin) * self.usual_s >= _REPEATED_S
+            beside = slice(begin - 1, end + (kind == "q"))  # where it goes on, the arm is elsewhere
+            turned = q is None or bool((np.ptp(q[beside], axis=0) > _TURNED_RAD).any())
+            moving = kind == "q" and dq is not None and bool((np.abs(dq[begin]) > _MOVING_RAD_S).any())
+            same[begin:end] = lasts and (turned or moving)
+        return same
 
 
 @value
@@ -204,15 +285,35 @@ def check_reach(place: Path, q: FloatArray, model: RobotModel) -> None:
     )
 
 
-def check_steps_back(place: Path, time: IntArray, where: Callable[[int], str]) -> None:
-    """Refuse instants (N,) [ns] that begin anew: sorted, two motions would be one. `where` names a sample."""
-    back = (np.maximum.accumulate(time) - time) / 1e9 if len(time) else np.zeros(1)
-    if back.max() > _LATE_S:
-        first = int(np.argmax(back > _LATE_S))
-        raise RecordingError(
-            f"{place}, {where(first)}: the time goes back by {back[first]:.3g} s: give one recording, cut to a part in"
-            " which time never goes back."
-        )
+def unwrapped(time: IntArray) -> tuple[IntArray, float]:
+    """Let instants (N,) [ns] of a clock that begins anew at its end go on; also returned is after what time it does.
+
+    That is 0.0 s where it does not, or does so otherwise than a clock that is too small.
+    """
+    steps = np.diff(time)
+    back = steps < -1e9 * _LATE_S
+    if not back.any():
+        return time, 0.0
+    for period_s in (*_COUNTERS_S, *_CLOCKS_S):
+        period = round(1e9 * period_s)
+        between, least = steps[back] + period, 0 if time.min() >= 0 else -period // 2  # of a counter with a sign
+        within = time.min() >= least and time.max() < least + period
+        alike = within and between.min() >= 0 and between.max() <= 1e9 * _WRAP_S
+        # two recordings that each lasted a minute begin at zero
+        if alike and (period_s in _COUNTERS_S or time[0] > 1e9 * _WRAP_S):
+            return time + period * np.append(0, np.cumsum(back)), period_s
+    return time, 0.0
+
+
+def goes_on(time: IntArray) -> bool:
+    """Return True if instants (N,) [ns], their wraps undone, are those of one recording."""
+    forward, _ = unwrapped(time)
+    return len(time) < 2 or bool(_back(forward).max() <= _LATE_S and np.median(np.diff(forward)) > 0)
+
+
+def _back(time: IntArray) -> FloatArray:
+    """How far instants (N,) [ns] lie before an earlier one [s]."""
+    return np.asarray((np.maximum.accumulate(time) - time) / 1e9)
 
 
 def gaps(time: FloatArray, longer_s: float = GAP_S) -> list[Note]:

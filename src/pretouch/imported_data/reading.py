@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pretouch.imported_data.bags import Bag
     from pretouch.imported_data.tables import Table
 
-_EE_FRAMES = ("_k", "_ee", "_tcp", "_hand", "link8", "tool0", "_flange")
+EE_FRAMES = ("_k", "_ee", "_tcp", "_hand", "link8", "tool0", "_flange")
 
 
 @value
@@ -43,8 +43,10 @@ def open_log(place: Path, choice: Choice) -> "Bag | Table":
         raise RecordingError(f"The recording {place} does not exist: check its name.")
     if not (folder or file):  # as a pipe or a device, which may have no end
         raise RecordingError(f"{place} is no file: give a recording that is one.")
-    if folder and not (place / "metadata.yaml").is_file():
-        raise RecordingError(f"The folder {place} has no metadata.yaml: give the folder of a ROS 2 bag, or a file.")
+    if folder and not any(file.name == "metadata.yaml" or file.suffix in BAGS for file in place.iterdir()):
+        raise RecordingError(
+            f"The folder {place} has no metadata.yaml and no bag: give that of a ROS 2 bag, or a file."
+        )
     ending = place.suffix.lower()
     if folder or ending in BAGS:
         from pretouch.imported_data.bags import Bag
@@ -85,17 +87,14 @@ def read_force(file: "Bag | Table", choice: Choice) -> ForceRecording:
     log = file.force(in_ee).in_order()
     values = np.hstack([log.arrays[kind] for kind in ("force", "torque") if kind in log.arrays])
     force, notes = (-1.0 if by_robot else 1.0) * log.arrays["force"], list(log.notes)
-    unusable, zero = ~np.isfinite(values).all(axis=1), ~np.any(values, axis=1)
+    unusable, zero = np.asarray(~np.isfinite(values).all(axis=1)), np.asarray(~np.any(values, axis=1))
     missing = choice.zeros == "missing" or (choice.zeros == "auto" and by_robot)
-    if unusable.any():
-        notes.append(Note("no_estimate", {"count": int(unusable.sum())}))
-    if zero.any():
-        notes.append(Note("zeros_missing" if missing else "zeros_kept", {"count": int(zero.sum())}))
+    notes += log.counted("no_estimate", unusable) + log.counted("zeros_missing" if missing else "zeros_kept", zero)
     force = np.where((unusable | (zero & missing))[:, None], np.nan, force)
     if in_ee:
         check_reach(log.place, log.arrays["q"], log.model)
         force = _in_base(log.model, log.arrays["q"], force)
-    elif log.frame_id.lower().endswith(_EE_FRAMES):
+    elif log.frame_id.lower().endswith(EE_FRAMES):
         notes.append(Note("looks_ee", {"frame": log.frame_id}))
     time = log.time - log.time[0]
     source, first = log.sources["force"], log.time[0] / 1e9

@@ -5,23 +5,15 @@ import math
 import re
 from array import array
 from collections.abc import Iterator
+from contextlib import suppress
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pretouch.errors import ParameterError, RecordingError
-from pretouch.imported_data.log import (
-    PARQUET,
-    TORQUES,
-    Choice,
-    Log,
-    Note,
-    arm_of,
-    check_steps_back,
-    joint_places,
-    listed,
-)
+from pretouch.imported_data.log import PARQUET, TORQUES, Choice, Log, Note, arm_of, joint_places, listed
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 
@@ -53,12 +45,16 @@ _LATEST_S = 4e9
 _LONGEST_LIST = 64
 """Places of a list in a Parquet file that are columns: more joints nobody has."""
 
-_SHOWN = {
-    "time": "time_s",
-    "q": "q1_rad ...",
-    "force": "force_x_N, force_y_N, force_z_N",
-    "tau_ext": "tau_ext1_Nm ... or tau1_Nm ...",
+_QUANTITIES = {
+    "time": ("times", "time_s"),
+    "q": ("joint positions", "q1_rad ..."),
+    "dq": ("joint velocities", "dq1_rad_s ..."),
+    "force": ("force", "force_x_N, force_y_N, force_z_N; of joints, q1_rad ... and tau1_Nm ..."),
+    "tau_ext": ("torques", "tau_ext1_Nm ... or tau1_Nm ..."),
+    "tau": ("torques", ""),
+    "current": ("motor currents", ""),
 }
+"""Words for quantities in sentences, and their columns."""
 
 
 @value
@@ -88,6 +84,7 @@ class Table:
         self._names = renamed(place, _header(place) if self._parquet is None else list(self._parquet), choice.columns)
         self._columns = _columns([name.lower() for name in self._names])
         self.kinds = frozenset(column.kind for column in self._columns.values())
+        self._dated = False
 
     def force(self, posture: bool) -> Log:
         """Read the force, and where asked for the joint positions at its instants."""
@@ -103,10 +100,12 @@ class Table:
         return self._read("q")
 
     def _read(self, *needed: str, also: tuple[str, ...] = ()) -> Log:
-        if missing := [_SHOWN[kind] for kind in ("time", *needed) if kind not in self.kinds]:
+        if missing := [kind for kind in ("time", *needed) if kind not in self.kinds]:
+            there = [name for kind, (name, _) in _QUANTITIES.items() if kind in self.kinds] or ["columns"]
+            lacking = ["no {} ({})".format(*_QUANTITIES[kind]) for kind in missing]
             raise RecordingError(
-                f"{self._place} has the columns {listed(self._names)}, but not {' and not '.join(missing)}: name them"
-                " so; `pretouch detect --columns` takes other names."
+                f"{self._place} has {' and '.join(there)}, but {' and '.join(lacking)}: add columns of these names, or"
+                f" name them by `pretouch detect --columns`; it has {listed(self._names)}."
             )
         joints = list(self._parts("q")) if "q" in needed else []
         model = arm_of(joints, self._choice)
@@ -132,14 +131,17 @@ class Table:
         table, rows = self._numbers(used)
         table = np.where(np.isfinite(table), table, np.nan) * factors
         timed = np.isfinite(table[:, 0])
-        notes = [Note("no_time", {"count": int((~timed).sum())})] if not timed.all() else []
+        time = np.zeros(len(table), dtype=np.int64)
+        time[timed] = self._instants(table[timed, 0])
+        notes = [Note("dates", {"column": self._names[used[0]]})] if self._dated else []
         if unused := [name for i, name in enumerate(self._names) if i not in used]:
             notes.append(Note("unused", {"names": listed(unused)}))
-        time = self._instants(table[timed, 0], rows[timed])
+        row = "line {}" if self._parquet is None else "row {}"
         ends = np.cumsum([1, *map(len, places.values())])
-        arrays = {kind: table[timed, a:b] for kind, a, b in zip(places, ends[:-1], ends[1:], strict=True)}
+        arrays = {kind: table[:, a:b] for kind, a, b in zip(places, ends[:-1], ends[1:], strict=True)}
         by_robot = "tau_ext" in places and self._columns[places["tau_ext"][0]].by_robot
-        return Log(self._place, model, time, arrays, sources, "", by_robot, tuple(notes))
+        log = Log(self._place, model, time, rows, row, arrays, sources, "", by_robot, tuple(notes))
+        return log.without("no_time", ~timed)
 
     def _parts(self, kind: str) -> dict[str, int]:
         """Return the column of each part of a kind; the first where a log has two."""
@@ -178,9 +180,9 @@ class Table:
         width = max(i for i, name in enumerate(self._names) if name) + 1
         for line, row in rows:
             if len(row) < width or any(cell.strip() for cell in row[width:]):
+                hint = ", with decimal points" if len(row) > width else " (it ends early)"
                 raise RecordingError(
-                    f"{self._place}, line {line}: {len(row)} cells for {width} columns: give each line as many, with"
-                    " decimal points."
+                    f"{self._place}, line {line}: {len(row)} cells for {width} columns: give each line as many{hint}."
                 )
             try:
                 numbers = [float(row[i].replace("_", "?")) for i in used]  # Python takes 1_0 for a number
@@ -191,14 +193,20 @@ class Table:
         return np.array(cells).reshape(-1, len(used)), np.array(lines, dtype=np.int64)
 
     def _number(self, line: int, i: int, cell: str) -> float:
-        try:
+        with suppress(ValueError):
             return float(cell.replace("_", "?") or "nan")
-        except ValueError:
-            hint = "use a decimal point" if re.fullmatch(r"[-+]?\d+,\d+", cell) else "write a number or leave it empty"
-            raise RecordingError(f"{self._place}, line {line}: {self._names[i]} is {cell[:40]!r}: {hint}.") from None
+        is_time, hint = self._columns[i].kind == "time", "write a number or leave it empty"
+        if is_time:
+            with suppress(ValueError):
+                instant, self._dated = datetime.fromisoformat(cell), True
+                return (instant if instant.tzinfo else instant.replace(tzinfo=UTC)).timestamp() / self._factor(i)
+            hint = "write a number, or a date as 2026-10-25T02:59:40.25"
+        if re.fullmatch(r"[-+]?\d+,\d+", cell):
+            hint = "use a decimal point"
+        raise RecordingError(f"{self._place}, line {line}: {self._names[i]} is {cell[:40]!r}: {hint}.")
 
-    def _instants(self, seconds: FloatArray, rows: IntArray) -> IntArray:
-        """Instants (N,) [ns] that go on."""
+    def _instants(self, seconds: FloatArray) -> IntArray:
+        """Instants (N,) [ns]."""
         if not len(seconds):
             raise RecordingError(f"{self._place} has no row with a time: add rows below the header.")
         first, last = float(seconds.min()), float(seconds.max())
@@ -206,9 +214,7 @@ class Table:
             raise RecordingError(
                 f"The times of {self._place} go from {first:.6g} to {last:.6g} s: check their unit, or cut the file."
             )
-        time = round(float(seconds[0]) * 1e9) + np.round((seconds - seconds[0]) * 1e9).astype(np.int64)
-        check_steps_back(self._place, time, lambda i: f"{'line' if self._parquet is None else 'row'} {rows[i]}")
-        return time
+        return round(float(seconds[0]) * 1e9) + np.round((seconds - seconds[0]) * 1e9).astype(np.int64)
 
 
 def _columns(names: list[str]) -> dict[int, _TableColumn]:
@@ -259,7 +265,7 @@ def _rows(place: Path) -> Iterator[tuple[int, list[str]]]:
                 if any(cell.strip() for cell in cells):
                     yield lines.line_num, cells
     except UnicodeDecodeError as error:
-        raise RecordingError(f"{place} is not UTF-8 text ({error.reason}): give a CSV file.") from error
+        raise RecordingError(f"{place} is not UTF-8 text ({error.reason}): save it as UTF-8.") from error
     except csv.Error as error:
         raise RecordingError(f"{place} is not a CSV file ({error}): separate columns by , ; or a tab.") from error
     except OSError as error:
@@ -275,15 +281,20 @@ def _parquet(place: Path) -> dict[str, Any]:
     try:
         table = parquet.read_table(place)
     except (OSError, pa.ArrowException) as error:
-        what = " ".join(str(error).split())[:200]
-        raise RecordingError(f"{place} cannot be read as a Parquet file ({what}): give a complete file.") from error
+        begun = place.is_file() and place.read_bytes()[:4] == b"PAR1"
+        what = f"{' '.join(str(error).split())[:200]}): " + ("give a complete file" if begun else "it is none")
+        raise RecordingError(f"{place} cannot be read as a Parquet file ({what}.") from error
     columns: dict[str, Any] = {}
     for name in table.column_names:
         column, types = table[name], pa.types
         if types.is_timestamp(column.type) or types.is_duration(column.type):  # the type tells the unit
             columns[f"{re.sub('_(s|ms|us|ns)$', '', name)}_{column.type.unit}"] = column.cast(pa.int64())
         elif types.is_list(column.type) or types.is_large_list(column.type) or types.is_fixed_size_list(column.type):
-            length = min(pc.min(pc.list_value_length(column)).as_py() or 0, _LONGEST_LIST)
+            lengths = pc.list_value_length(column).to_numpy()
+            if (other := np.flatnonzero(lengths != lengths[:1])).size:
+                row, counts = other[0] + 1, f"{lengths[other[0]]:g} values, and {lengths[0]:g} in row 1"
+                raise RecordingError(f"{place}, row {row}: {name} has {counts}: give each row as many.")
+            length = min(int(lengths[0]) if len(lengths) else 0, _LONGEST_LIST)
             columns |= {f"{name}[{i}]": pc.list_element(column, i) for i in range(length)}
         else:
             columns[name] = column

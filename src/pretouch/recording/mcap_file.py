@@ -18,7 +18,7 @@ from pretouch.errors import RecordingError
 _MAGIC = b"\x89MCAP0\r\n"
 _LARGEST = 1 << 26
 """A record of more bytes is damage: our chunks have 0.3 MB, those of other tools some 10 MB."""
-_DAMAGE = (McapError, ZstdError, struct.error, ValueError, KeyError, OverflowError, RuntimeError, MemoryError, OSError)
+DAMAGE = (McapError, ZstdError, struct.error, ValueError, KeyError, OverflowError, RuntimeError, MemoryError, OSError)
 """Errors of the library and its decompressors for bytes cut off or damaged: RuntimeError is lz4's, OSError a
 file shorter than its last record, or a disk that cannot read on."""
 _Kind = TypeVar("_Kind")
@@ -31,6 +31,8 @@ class Message(NamedTuple):
     kind: str
     """Its type, as sensor_msgs/msg/Imu."""
     data: bytes
+    time: int = 0
+    """Time of its recording [ns]."""
 
 
 @dataclass(slots=True)
@@ -41,6 +43,8 @@ class Contents:
     """Library that wrote the file."""
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
+    counts: dict[int, int] = field(default_factory=dict)
+    """Messages of each channel, by what the end of the file says."""
     complete: bool = False
     """True if the file has its end."""
 
@@ -63,11 +67,15 @@ class Contents:
         messages = []
         for record in breakup_chunk(chunk, validate_crc=True):
             if isinstance(record, Record):
-                channel = self.channels[record.channel_id]
-                messages.append(Message(channel.topic, self.kind(channel), record.data))
+                messages.append(self.message(record))
             else:
                 self.add(record)
         return messages
+
+    def message(self, record: Record) -> Message:
+        """Return the message of a record."""
+        channel = self.channels[record.channel_id]
+        return Message(channel.topic, self.kind(channel), record.data, record.log_time)
 
 
 def open_mcap(place: Path, remedy: str) -> BinaryIO:
@@ -89,16 +97,18 @@ def open_mcap(place: Path, remedy: str) -> BinaryIO:
 
 
 def chunks(file: BinaryIO, contents: Contents) -> Iterator[tuple[int, list[Message]]]:
-    """Yield offset and messages of each whole chunk, up to the end of the file or to what is damaged."""
+    """Yield offset and messages of each whole chunk, or of a message in none, up to the end of the file or damage."""
     at = file.tell()
     try:
         for record in StreamReader(file, emit_chunks=True, record_size_limit=_LARGEST).records:
             if isinstance(record, Chunk):
                 yield at, contents.messages(record)
+            elif isinstance(record, Record):
+                yield at, [contents.message(record)]
             else:
                 contents.add(record)
             at = file.tell()
-    except _DAMAGE:
+    except DAMAGE:
         contents.complete = False
     else:
         contents.complete = True
@@ -110,12 +120,13 @@ def indexed_chunks(file: BinaryIO, contents: Contents) -> list[ChunkIndex]:
         reader = SeekingReader(file, record_size_limit=_LARGEST)
         contents.add(reader.get_header())
         summary = reader.get_summary()
-    except _DAMAGE:
+    except DAMAGE:
         summary = None
     if summary is None:
         return []
     contents.schemas.update(summary.schemas)
     contents.channels.update(summary.channels)
+    contents.counts.update(summary.statistics.channel_message_counts if summary.statistics else {})
     contents.complete = True
     return sorted(summary.chunk_indexes, key=lambda chunk: chunk.chunk_start_offset)
 
@@ -124,7 +135,7 @@ def chunk_at(file: BinaryIO, offset: int, contents: Contents) -> list[Message]:
     """Return the messages of the chunk at an offset; a damaged one is a RecordingError."""
     try:
         return contents.messages(_record_at(file, offset, Chunk))
-    except _DAMAGE as error:
+    except DAMAGE as error:
         raise _damaged("chunk", offset, error) from error
 
 
@@ -135,7 +146,7 @@ def message_count(file: BinaryIO, chunk: ChunkIndex, channel: int) -> int:
         return 0
     try:
         return len(_record_at(file, offset, MessageIndex).records)
-    except _DAMAGE as error:
+    except DAMAGE as error:
         raise _damaged("index", offset, error) from error
 
 

@@ -210,7 +210,7 @@ def _by_reading(file: BinaryIO, contents: Contents) -> _Parts:
 def _ours(messages: list[Message]) -> Raw:
     """Return the messages on our topics, the first of two alike."""
     raw: Raw = {}
-    for topic, kind, data in messages:
+    for topic, kind, data, _ in messages:
         if TOPICS.get(topic) == kind and len(data) >= _HEAD + _NUMBER.size:
             raw.setdefault((topic, _NUMBER.unpack_from(data, _HEAD)[0]), data)
     return raw
