@@ -20,8 +20,7 @@ from pretouch.cli.skin_monitor import only_here
 from pretouch.types import RangeStatus
 from pretouch.units import EVERYWHERE
 from pretouch.units.keys import Keys, UnitKey, load_keys, new_key, save_keys
-from pretouch.units.skin_reader import read_skin
-from pretouch.units.skin_recording import SkinRecording
+from pretouch.units.skin_recording import SkinRecording, read_skin
 from pretouch.units.wire import Flag
 from tests.ports import free_port
 from tests.units.desk import Desk

@@ -20,7 +20,7 @@ from pretouch.errors import RecordingError, RobotError
 from pretouch.sensing.skin import load_skin
 from pretouch.session.run import Ending, go
 from pretouch.units.skin import NetworkSkin, Traffic
-from pretouch.units.skin_reader import read_skin
+from pretouch.units.skin_recording import read_skin
 from tests.calibrated_arm import assert_same_places
 from tests.session.arms import AT_REST, FollowingArm
 from tests.test_cli_skin import started

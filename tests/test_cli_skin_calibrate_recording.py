@@ -10,9 +10,10 @@ import pytest
 from pretouch import cli
 from pretouch.calibration.calibrate import BOARD_MISALIGNMENT_DEG
 from pretouch.cli.calibrate import recorded as recording_way
+from pretouch.imported_data.reading import read_joints
 from pretouch.sensing.skin import Skin, load_skin, save_skin
 from pretouch.traces import JointTrace
-from pretouch.units.skin_reader import read_skin
+from pretouch.units.skin_recording import SkinRecording, read_skin
 from tests.calibrated_arm import assert_same_places, record_motion
 
 pytestmark = pytest.mark.slow
@@ -40,11 +41,15 @@ def recorded(panda_model, skin, tmp_path_factory):
 
 
 @pytest.fixture
-def read_as(recorded, monkeypatch):
+def read_as(recorded, monkeypatch, panda_model):
     """Have the recording read as if some of it were otherwise; `whole` is all of it."""
 
-    def changed(**changes):
+    def changed(flipped=False, **changes):
         monkeypatch.setattr(recording_way, "read_skin", lambda place: replace(changed.whole, **changes))
+        if flipped:
+            trace, log = read_joints(recorded / "units.mcap", panda_model)
+            joints = JointTrace(trace.stamp, np.flip(trace.q, axis=0))
+            monkeypatch.setattr(recording_way, "read_joints", lambda *_: (joints, log))
 
     changed.whole = read_skin(recorded / "units.mcap")
     return changed
@@ -128,10 +133,8 @@ def test_a_skin_file_is_replaced_only_if_that_is_said(panda_model, skin, recorde
 @pytest.mark.parametrize(
     ("words", "changes", "said"),
     [
-        ((), {"joints": None}, "units.mcap has no joint states: give the file that has them with --joints"),
         ((), {"units": {}}, "units.mcap holds no IMU data"),
         (("--topic", "/joint_states"), {}, "--topic needs --joints"),
-        (("--arm", "fr3"), {}, "has no states of fr3_joint1"),
     ],
 )
 def test_what_is_missing_is_said(recorded, capsys, read_as, words, changes, said):
@@ -140,16 +143,17 @@ def test_what_is_missing_is_said(recorded, capsys, read_as, words, changes, said
     assert said in capsys.readouterr().err
 
 
-def test_joint_states_in_another_order_are_put_in_that_of_the_arm(panda_model, skin, tmp_path, read_as):
-    whole = read_as.whole
-    read_as(joints=JointTrace(whole.joints.stamp, whole.joints.q[:, ::-1]), joint_names=whole.joint_names[::-1])
-    assert calibrate("--recording", "units.mcap", "--out", tmp_path / "skin.toml") == 0
-    assert_same_places(load_skin(tmp_path / "skin.toml", panda_model), skin)
+def test_a_recording_without_joint_states_is_refused(recorded, tmp_path, capsys, read_as):
+    read_as()
+    place = tmp_path / "units.mcap"
+    with SkinRecording(place) as recording:
+        recording.add(read_as.whole.units["hand_left"].samples[:9], ["a", "b", "c"])
+    assert calibrate("--recording", place) == 2
+    assert "units.mcap has no joint states: give the file that has them with --joints" in capsys.readouterr().err
 
 
-def test_nothing_is_written_where_no_unit_is_good(tmp_path, capsys, read_as):
-    joints = read_as.whole.joints
-    read_as(joints=JointTrace(joints.stamp, np.flip(joints.q, axis=0)))
-    assert calibrate("--recording", "units.mcap", "--out", tmp_path / "skin.toml") == 1
+def test_nothing_is_written_where_no_unit_is_good(recorded, tmp_path, capsys, read_as):
+    read_as(flipped=True)
+    assert calibrate("--recording", recorded / "units.mcap", "--out", tmp_path / "skin.toml") == 1
     assert f"{tmp_path / 'skin.toml'} is not written." in capsys.readouterr().out
     assert not (tmp_path / "skin.toml").exists()

@@ -12,8 +12,7 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import SceneSpec
 from pretouch.units.fleet import ChannelParams, FleetParams, NetworkParams
-from pretouch.units.skin_reader import read_skin
-from pretouch.units.skin_recording import SkinRecording
+from pretouch.units.skin_recording import SkinRecording, read_skin
 from tests.wire_skin import WireSkin
 
 EVEN = ChannelParams(delay_s=0.0012, jitter_s=0.0012, jitter_shape=2.0)

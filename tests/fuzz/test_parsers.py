@@ -28,8 +28,7 @@ from pretouch.sensing.skin import load_skin, paper_skin, skin_file
 from pretouch.session.memory import load_learnt, save_learnt
 from pretouch.types import RangeStatus
 from pretouch.units.keys import load_keys, save_keys
-from pretouch.units.skin_reader import read_skin
-from pretouch.units.skin_recording import SkinRecording
+from pretouch.units.skin_recording import SkinRecording, read_skin
 from pretouch.units.wire import TAG_SIZE
 from tests.following_arm import controller_of
 from tests.fuzz.mutations import Change, changed, changes

@@ -13,8 +13,7 @@ from pretouch import cli
 from pretouch.errors import RecordingError
 from pretouch.recording.reader import open_recording
 from pretouch.sensing.unit import ACCELERATION_LSB, ANGULAR_RATE_LSB
-from pretouch.units.skin_reader import SkinTrace, read_skin
-from pretouch.units.skin_recording import SkinRecording
+from pretouch.units.skin_recording import SkinRecording, SkinTrace, read_skin
 from pretouch.units.unit import Received, imu_batch
 from pretouch.units.wire import IMU_SAMPLE, Flag, Sample, TouchPart
 from tests.following_arm import controller_of
@@ -67,7 +66,6 @@ def test_every_field_of_every_sample_comes_back(place):
     trace = read_skin(place)
     assert trace.complete
     assert list(trace.units) == ["hand/1", "wrist"]
-    assert (trace.joints, trace.joint_names) == (None, ())
     for index, unit in enumerate(trace.units.values()):
         assert len(unit.samples) == 100
         for number, received in enumerate(unit.samples, 1):
@@ -203,21 +201,6 @@ def test_the_usual_tools_read_states_of_joints(tmp_path):
             assert state.velocity.tolist() == (0.1 * q).tolist()
             assert not len(state.effort)
             assert time == round(t * 1e9) == state.header.stamp.sec * 10**9 + state.header.stamp.nanosec
-
-
-def test_states_of_joints_are_sorted_and_what_is_no_number_or_came_twice_is_left_out(tmp_path):
-    q = Q.copy()
-    q[5] = np.nan
-    trace = read_back(
-        tmp_path / "a.mcap", FEW, (STAMP[100:], q[100:], None, NAMES), (STAMP[:101], q[:101] + 1.0, None, NAMES)
-    )
-    np.testing.assert_array_equal(trace.joints.q, np.delete(np.vstack([q[:101] + 1.0, q[101:]]), 5, axis=0))
-    np.testing.assert_allclose(trace.joints.stamp, np.delete(STAMP, 5), atol=1e-9)
-
-
-def test_joints_of_another_arm_in_the_same_file_are_refused(tmp_path):
-    with pytest.raises(RecordingError, match="states of the joints a, b and of panda_joint1, panda_joint2"):
-        read_back(tmp_path / "a.mcap", FEW, (STAMP, Q, None, NAMES), (STAMP, Q, None, ("a", "b")))
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from pretouch.types import FloatArray, RangeStatus
 from pretouch.units import HOST, PORT
 from pretouch.units.keys import load_keys
 from pretouch.units.skin import NetworkSkin
-from pretouch.units.skin_reader import unit_trace
+from pretouch.units.skin_recording import unit_trace
 from pretouch.units.unit import Received
 from pretouch.units.watch import UnitWatch
 from pretouch.units.wire import ZONE, ZONES, Flag

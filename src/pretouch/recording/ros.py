@@ -26,7 +26,7 @@ OWN = ("Contact", "Obstacles", "QpSolution", "Thresholds", "Touched", "Step", "T
 """Our types, each after those that it holds; each has a file in `msg/`."""
 PACKED, UNIT_SAMPLE = f"{PACKAGE}/msg/Packed", f"{PACKAGE}/msg/UnitSample"
 """Types of what is MessagePack, and of datagrams."""
-READ_WITH = "read it with pretouch.units.skin_reader.read_skin, or open it in Foxglove"
+READ_WITH = "read it with pretouch.units.skin_recording.read_skin, or open it in Foxglove"
 """Advice on a recording of sensor units, as the end of a sentence."""
 JOINT_STATE, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
 RANGE, IMU = "sensor_msgs/msg/Range", "sensor_msgs/msg/Imu"

@@ -16,12 +16,12 @@ from pretouch.cli.options import JsonFile, OptionalFile
 from pretouch.cli.tables import PlainTable
 from pretouch.cli.writing import check_outputs, plain, same_file
 from pretouch.errors import CalibrationError
-from pretouch.imported_data.log import TABLES
-from pretouch.imported_data.reading import read_joints
+from pretouch.imported_data.log import TABLES, Choice
+from pretouch.imported_data.reading import open_log, read_joints
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, save_skin
 from pretouch.traces import ImuTrace, JointTrace
-from pretouch.units.skin_reader import SkinTrace, read_skin
+from pretouch.units.skin_recording import SkinTrace, read_skin
 
 _NO_IMU = ImuTrace(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
 _COLUMNS = (
@@ -86,9 +86,12 @@ def calibrate_recorded(
         )
     believed = load_skin(files.skin, model) if files.skin else None
     measured = read_skin(recording)
-    joints, notes = _joints(model, measured, recorded)
+    joints, notes = _joints(model, recorded)
     if not measured.complete:
         notes = [f"{recording} is incomplete or damaged: the readable part is used.", *notes]
+    undated = {name: int(np.isnan(unit.imu.stamp).sum()) for name, unit in measured.units.items()}
+    if texts := ", ".join(f"{name} {count}" for name, count in undated.items() if count):
+        notes.append(f"IMU samples whose time is not known, as before a unit's clock is, are left out: {texts}.")
     data = CalibrationData(joints, _units(measured, believed))
     if not data.units:
         raise CalibrationError(
@@ -112,26 +115,18 @@ def calibrate_recorded(
     return int(not all(unit.accepted for unit in answer.units))
 
 
-def _joints(model: RobotModel, measured: SkinTrace, recorded: CalibrateRecording) -> tuple[JointTrace, list[str]]:
+def _joints(model: RobotModel, recorded: CalibrateRecording) -> tuple[JointTrace, list[str]]:
     """Return the joint positions in the order of the model, and what is to be said of them."""
-    if recorded.joints:
-        trace, log = read_joints(recorded.joints, model, recorded.topic)
-        return trace, [f"Joint states are {log.sources['q']} of {recorded.joints}.", *sentences(log.notes)]
-    if recorded.topic:
+    place = recorded.joints or recorded.recording or Path()
+    if recorded.joints is None and recorded.topic:
         raise CalibrationError("--topic needs --joints: it names a topic of that file.")
-    if measured.joints is None:
+    if recorded.joints is None and "q" not in open_log(place, Choice(arm=model)).kinds:
         raise CalibrationError(
-            f"{recorded.recording} has no joint states: give the file that has them with --joints, or let"
-            " `pretouch skin calibrate NAME` move the arm."
+            f"{place} has no joint states: give the file that has them with --joints, or let `pretouch skin calibrate"
+            " NAME` move the arm."
         )
-    missing = [name for name in model.joints if name not in measured.joint_names]
-    if missing:
-        raise CalibrationError(
-            f"{recorded.recording} has no states of {', '.join(missing)} (it has {', '.join(measured.joint_names)}):"
-            " give the arm they are of with --arm."
-        )
-    order = [measured.joint_names.index(name) for name in model.joints]
-    return JointTrace(measured.joints.stamp, measured.joints.q[:, order]), []
+    trace, log = read_joints(place, model, recorded.topic)
+    return trace, [f"Joint states are {log.sources['q']} of {place}.", *sentences(log.notes)]
 
 
 def _units(measured: SkinTrace, believed: Skin | None) -> tuple[UnitData, ...]:
