@@ -50,6 +50,7 @@ def test_a_message_without_all_of_our_joints_is_another_devices(joints):
 def test_positions_that_are_not_one_for_each_name_are_not_taken(joints, positions):
     joints.take(joint_state(1, "abc", positions), 5.0, 1)
     assert joints.newest is None
+    assert joints.unequal == f"names 3 joints and has {len(positions)} positions"
 
 
 @pytest.mark.parametrize("given", [(), [math.nan] * 3])
@@ -211,7 +212,10 @@ def test_a_frame_id_that_does_not_fit_the_setting_is_named(frame_id, frame, doub
     [
         (0.5, 0.04, 4.0, RangeStatus.OK),
         (0.04, 0.04, 4.0, RangeStatus.OK),
-        (4.0, 0.04, 4.0, RangeStatus.OK),
+        (3.99, 0.04, 4.0, RangeStatus.OK),
+        (4.0, 0.04, 4.0, RangeStatus.SIGNAL),
+        (-1.0, 0.04, 4.0, RangeStatus.NONE),
+        (900.0, 40.0, 4000.0, RangeStatus.NONE),
         (4.1, 0.04, 4.0, RangeStatus.SIGNAL),
         (math.inf, 0.04, 4.0, RangeStatus.SIGNAL),
         (0.03, 0.04, 4.0, RangeStatus.MIN_RANGE),

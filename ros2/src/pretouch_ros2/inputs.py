@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from pretouch.imported_data.reading import EE_FRAMES
 from pretouch.types import FloatArray
 from pretouch.values import value
 from pretouch_ros2.params import ArmParams
@@ -14,8 +15,6 @@ _NAMES_MOST = 1000
 """Most joints of a message; a longer message is ignored."""
 _OTHERS_MOST = 64
 """Most names of other joints that are stored: a publisher of ever new names must not fill the memory."""
-_EE_FRAMES = ("_k", "_ee", "_tcp", "_hand", "link8", "tool0", "_flange")
-"""How the names of end-effectors' frames end."""
 
 
 @value
@@ -47,6 +46,8 @@ class Joints:
         """Last measurement."""
         self.others: set[str] = set()
         """Joints named in messages that do not have all of ours; some of them, where there are many."""
+        self.unequal = ""
+        """Numbers of names and of positions that differ, as part of a sentence."""
         self.differentiated = False
         """True if the messages have no velocities, so that they are taken from the positions."""
 
@@ -58,6 +59,7 @@ class Joints:
             self.others |= set(self.names).intersection(few) | set(few[: max(_OTHERS_MOST - len(self.others), 0)])
             return
         if len(message.position) != len(message.name):
+            self.unequal = f"names {len(message.name)} joints and has {len(message.position)} positions"
             return
         stamp = self.stamps.instant(message.header, received, writer)
         if stamp is None:
@@ -134,7 +136,7 @@ class Wrench(_ForceEstimate):
     @property
     def warning(self) -> str:
         """Sentence on a frame setting that looks wrong, or ''."""
-        looks_ee = self.frame_id.lower().endswith(_EE_FRAMES)
+        looks_ee = self.frame_id.lower().endswith(EE_FRAMES)
         if looks_ee == (self._params.frame == "ee") or not self.frame_id:
             return ""
         return (

@@ -54,9 +54,7 @@ class Ros2Output:
     def record(self, cycle: Cycle) -> None:
         """Have a turn of the loop published, if it is time."""
         now, step = monotonic(), cycle.step
-        if self.failure:
-            return
-        if now < self._next and step.contact is None and step.mode is self._mode:
+        if self.failure or (now < self._next and step.contact is None and step.mode is self._mode):
             return
         if now >= self._next:
             self._next = now + _PERIOD_S
@@ -102,5 +100,4 @@ class Ros2Output:
 
 def _now() -> Stamp:
     """Return the time of day."""
-    now = time_ns()
-    return now // 10**9, now % 10**9
+    return divmod(time_ns(), 10**9)

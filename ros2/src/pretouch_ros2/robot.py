@@ -192,6 +192,8 @@ class Ros2Robot:
         """Say what has not come, and what there is; '' if nothing is missing."""
         p, joints = self.params, self._joints
         if joints.newest is None:
+            if joints.unequal:
+                return f"{p.joint_states} {joints.unequal}: publish as many, or set joint_states to another topic."
             if not joints.others:
                 return _no_publisher(p.joint_states, JOINT_STATE, "joint_states", self._node.topics(JOINT_STATE))
             return (

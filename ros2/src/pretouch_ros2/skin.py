@@ -73,11 +73,8 @@ class Ros2Skin:
         A unit for which several publish is silent: nobody can say whose readings are its own.
         """
         newest = [_NOTHING if s.together() else one for s, one in zip(self._stamps, tuple(self._newest), strict=True)]
-        return RangeReadings(
-            np.array([stamp for stamp, _, _ in newest]),
-            np.array([distance for _, distance, _ in newest]),
-            np.array([status for _, _, status in newest], dtype=np.int64),
-        )
+        stamp, distance, status = np.array(newest, dtype=np.float64).reshape(-1, 3).T.copy()
+        return RangeReadings(stamp, distance, status.astype(np.int64))
 
     def _topics(self) -> list[str]:
         topics = [self._topic.replace(_UNIT, topic_name(name)) for name in self._ids]
@@ -100,13 +97,14 @@ class Ros2Skin:
 
 
 def status_of(message: Any) -> RangeStatus:
-    """Return what a Range tells, by REP 117: beyond its limits there is nothing near, or it is too near.
+    """Return what a Range tells, by REP 117: from its farthest limit on there is nothing near, or it is too near.
 
-    A message without a span to measure in, as of a switch, tells nothing.
+    A message without a span to measure in, as of a switch, or with one in millimetres tells nothing.
     """
     distance, least, most = message.range, message.min_range, message.max_range
-    if math.isnan(distance) or not 0 <= least < most:
+    in_mm = 100.0 < most < math.inf  # no sensor of an arm measures so far [m]
+    if math.isnan(distance) or -math.inf < distance < 0 or not 0 <= least < most or in_mm:
         return RangeStatus.NONE
-    if distance > most:
+    if distance >= most:
         return RangeStatus.SIGNAL
     return RangeStatus.MIN_RANGE if distance < least else RangeStatus.OK
