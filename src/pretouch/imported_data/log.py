@@ -163,8 +163,9 @@ class Log:
         if notes := log.counted("sorted", np.append(False, np.diff(log.time) < 0)[: len(log)]):
             log = log.at(np.argsort(log.time, kind="stable")).noted(*notes)
         doubles = np.append(np.diff(log.time) == 0, False)[: len(log)]
+        most = _LATE_S / max(log.usual_s, 1e-9)
         for begin, end in spans(doubles):
-            if (end - begin) * log.usual_s > _LATE_S:
+            if end - begin > most:
                 raise RecordingError(
                     f"{self.place}, {log._where(begin)}: the time stands still for {end - begin + 1} samples: give a"
                     " time of its own for each."
@@ -196,12 +197,12 @@ class Log:
         """Mask of samples (N,) that repeat the one before, to the last digit and for long, and cannot have."""
         values, q, dq = self.arrays[kind], self.arrays.get("q"), self.arrays.get("dq")
         same = np.append(False, (values[1:] == values[:-1]).all(axis=1) & values[1:].any(axis=1))[: len(self)]
+        least = _REPEATED_S / max(self.usual_s, 1e-9)
         for begin, end in spans(same):
-            lasts = (end - begin) * self.usual_s >= _REPEATED_S
             beside = slice(begin - 1, end + (kind == "q"))  # where it goes on, the arm is elsewhere
             turned = q is None or bool((np.ptp(q[beside], axis=0) > _TURNED_RAD).any())
             moving = kind == "q" and dq is not None and bool((np.abs(dq[begin]) > _MOVING_RAD_S).any())
-            same[begin:end] = lasts and (turned or moving)
+            same[begin:end] = end - begin >= least and (turned or moving)
         return same
 
 
