@@ -8,13 +8,12 @@ from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from mcap.reader import SeekingReader
 from rosbags import rosbag1, rosbag2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from pretouch.errors import RecordingError
 from pretouch.imported_data.log import BAGS
-from pretouch.recording.mcap_file import DAMAGE, Contents, chunks, indexed_chunks
+from pretouch.recording.mcap_file import Contents, chunk_at, chunks, indexed_chunks
 from pretouch.values import value
 
 _DATABASE, _MCAP, _ROS1 = b"SQLite format 3\0", b"\x89MCAP0\r\n", b"#ROSBAG V2.0"
@@ -120,8 +119,8 @@ def _opened(place: Path) -> Iterator[BagFile]:
 
 def _mcap(place: Path, file: BinaryIO) -> BagFile:
     contents = Contents()
-    indexed = bool(indexed_chunks(file, contents) and contents.counts)
-    counts: dict[Any, int] = contents.counts
+    index = indexed_chunks(file, contents)
+    indexed, counts = bool(index and contents.counts), dict[Any, int](contents.counts)
     if not indexed:
         file.seek(0)
         counts = Counter(m.topic for _, messages in chunks(file, contents) for m in messages)
@@ -131,18 +130,11 @@ def _mcap(place: Path, file: BinaryIO) -> BagFile:
         raise RecordingError(f"{place} cannot be read as a bag or MCAP file, for it {what}.")
 
     def read(topics: set[str]) -> Iterator[Raw]:
+        own = {number for number, channel in contents.channels.items() if channel.topic in topics}
+        some = [c.chunk_start_offset for c in index if own & (c.message_index_offsets.keys() or own)]
         file.seek(0)
-        if not indexed:
-            every = (message for _, messages in chunks(file, contents) for message in messages)
-            yield from ((m.topic, m.time, m.data) for m in every if m.topic in topics)
-            return
-        try:
-            for _, channel, record in SeekingReader(file, validate_crcs=True).iter_messages(
-                topics, log_time_order=False
-            ):
-                yield channel.topic, record.log_time, record.data
-        except DAMAGE as error:
-            raise RecordingError(f"{place} is damaged ({_words(error)}): `mcap recover` keeps the rest.") from error
+        parts = (chunk_at(file, at, contents) for at in some) if indexed else (m for _, m in chunks(file, contents))
+        return ((m.topic, m.time, m.data) for messages in parts for m in messages if m.topic in topics)
 
     channels = []
     for number, channel in contents.channels.items():

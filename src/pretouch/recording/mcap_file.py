@@ -18,7 +18,7 @@ from pretouch.errors import RecordingError
 _MAGIC = b"\x89MCAP0\r\n"
 _LARGEST = 1 << 26
 """A record of more bytes is damage: our chunks have 0.3 MB, those of other tools some 10 MB."""
-DAMAGE = (McapError, ZstdError, struct.error, ValueError, KeyError, OverflowError, RuntimeError, MemoryError, OSError)
+_DAMAGE = (McapError, ZstdError, struct.error, ValueError, KeyError, OverflowError, RuntimeError, MemoryError, OSError)
 """Errors of the library and its decompressors for bytes cut off or damaged: RuntimeError is lz4's, OSError a
 file shorter than its last record, or a disk that cannot read on."""
 _Kind = TypeVar("_Kind")
@@ -108,7 +108,7 @@ def chunks(file: BinaryIO, contents: Contents) -> Iterator[tuple[int, list[Messa
             else:
                 contents.add(record)
             at = file.tell()
-    except DAMAGE:
+    except _DAMAGE:
         contents.complete = False
     else:
         contents.complete = True
@@ -120,7 +120,7 @@ def indexed_chunks(file: BinaryIO, contents: Contents) -> list[ChunkIndex]:
         reader = SeekingReader(file, record_size_limit=_LARGEST)
         contents.add(reader.get_header())
         summary = reader.get_summary()
-    except DAMAGE:
+    except _DAMAGE:
         summary = None
     if summary is None:
         return []
@@ -135,7 +135,7 @@ def chunk_at(file: BinaryIO, offset: int, contents: Contents) -> list[Message]:
     """Return the messages of the chunk at an offset; a damaged one is a RecordingError."""
     try:
         return contents.messages(_record_at(file, offset, Chunk))
-    except DAMAGE as error:
+    except _DAMAGE as error:
         raise _damaged("chunk", offset, error) from error
 
 
@@ -146,7 +146,7 @@ def message_count(file: BinaryIO, chunk: ChunkIndex, channel: int) -> int:
         return 0
     try:
         return len(_record_at(file, offset, MessageIndex).records)
-    except DAMAGE as error:
+    except _DAMAGE as error:
         raise _damaged("index", offset, error) from error
 
 
