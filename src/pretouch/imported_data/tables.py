@@ -141,7 +141,7 @@ class Table:
         arrays = {kind: table[:, a:b] for kind, a, b in zip(places, ends[:-1], ends[1:], strict=True)}
         by_robot = "tau_ext" in places and self._columns[places["tau_ext"][0]].by_robot
         log = Log(self._place, model, time, rows, row, arrays, sources, "", by_robot, tuple(notes))
-        return log.without("no_time", ~timed)
+        return log.without("no_time", ~timed).forward()
 
     def _parts(self, kind: str) -> dict[str, int]:
         """Return the column of each part of a kind; the first where a log has two."""

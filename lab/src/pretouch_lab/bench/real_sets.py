@@ -208,12 +208,12 @@ def stream_of(real: RealSet, runs: Sequence[RealRun], model: RobotModel) -> Torq
     arrays = {"q": [r.q for r in runs], "dq": [r.qd for r in runs], kind: [r.torque for r in runs]}
     joints = {name: np.concatenate(parts) for name, parts in arrays.items()}
     stamps = np.round(_laid([run.time for run in runs]) * 1e9).astype(np.int64)
-    r = torque_recording(
-        Log(Path(real.name), model, stamps, joints, dict.fromkeys(joints, real.name)), Choice(gains=gains)
-    )
-    loaded = observed(model, r.time, r.q, r.qd, joints[kind], SequentialParams().observer_gain_1_s, 1.0)
-    numbers = np.repeat(np.arange(len(runs)), [len(run.time) for run in runs])
-    return TorqueStream(r, np.concatenate([run.label for run in runs]), numbers, loaded - r.tau_ext)
+    rows, sources = np.arange(len(stamps)), dict.fromkeys(joints, real.name)
+    log = Log(Path(real.name), model, stamps, rows, "row {}", joints, sources).in_order(*joints)
+    r = torque_recording(log, Choice(gains=gains))
+    loaded = observed(model, r.time, r.q, r.qd, log.arrays[kind], SequentialParams().observer_gain_1_s, 1.0)
+    numbers = np.repeat(np.arange(len(runs)), [len(run.time) for run in runs])[log.rows]
+    return TorqueStream(r, np.concatenate([run.label for run in runs])[log.rows], numbers, loaded - r.tau_ext)
 
 
 def corrected(stream: TorqueStream, learnt: Sequence[int]) -> TorqueStream:
