@@ -93,7 +93,7 @@ def bodies_of(arm: ArmChain, most: int = MOST, cover: bool = False) -> tuple[Lin
             f"No moving link of {robot.name} has any geometry: give the links <collision> or <visual> shapes."
         )
     for link, surface in surfaces.items():
-        if (size := float(surface.extents.max())) > _LARGEST:
+        if (size := float(np.abs([surface.extents, *surface.bounds]).max())) > _LARGEST:
             raise RobotModelError(
                 f"The link {link.name} is {size:.4g} m long: if its meshes are in millimetres, give them the scale"
                 ' "0.001 0.001 0.001" in the file.'

@@ -17,8 +17,8 @@ _NAMES = ("tcp", "tool", "grasp", "ee", "eef", "effector", "tip")
 _ENDLESS = 2 * np.pi
 _SPEED, _ACCELERATION, _TORQUE = 1.0, 5.0, 50.0
 """Where nothing is known: slow, gentle and middling [rad/s, rad/s^2, Nm]."""
-_LARGEST_POSITION, _LARGEST_SPEED, _LARGEST_TORQUE = 4 * np.pi, 50.0, 5000.0
-"""Limits that no joint of an arm exceeds [rad, rad/s, Nm]."""
+_LARGEST_POSITION, _LARGEST_SPEED, _LARGEST_TORQUE = 4 * np.pi, 30.0, 5000.0
+"""Limits that no joint of an arm exceeds [rad, rad/s, Nm]: larger ones count as none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +151,18 @@ def limits_of(
     def among(names: list[str]) -> str:
         return "all joints" if len(names) == n else ", ".join(names)
 
+    def possible(what: str, unit: str, largest: float, values: list[float | None]) -> list[float | None]:
+        """Name the values that no joint of an arm has, and return None for them."""
+        pairs = zip(arm.joints, values, strict=True)
+        if beyond := [f"{joint.name} ({v:.6g} {unit})" for joint, v in pairs if v and v > largest]:
+            several = len(beyond) > 1 and "rad" in unit
+            guess = "they look like degrees in place of radians" if several else "perhaps they are of another unit"
+            remarks.append(
+                f"The {what} limits of {', '.join(beyond)} are not used, for no joint of an arm has such: {guess}."
+                " Correct them in the file."
+            )
+        return [v if v and v <= largest else None for v in values]
+
     def settled(
         what: str, unit: str, option: str, options: tuple[float, ...], in_file: list[float | None], usual: float
     ) -> FloatArray:
@@ -159,31 +171,34 @@ def limits_of(
             raise RobotModelError(f"{option} is {listed}: give one positive number [{unit}], or {n}, by commas.")
         if options:
             return np.broadcast_to(np.array(options, dtype=np.float64), n).copy()
-        if missing := [joint.name for joint, value in zip(arm.joints, in_file, strict=True) if value is None]:
+        largest = {"velocity": _LARGEST_SPEED, "torque": _LARGEST_TORQUE}.get(what, np.inf)
+        values = possible(what, unit, largest, in_file)
+        if missing := [joint.name for joint, value in zip(arm.joints, values, strict=True) if value is None]:
             remarks.append(
                 f"The file has no {what} limit of {among(missing)}: {usual:g} {unit} is assumed; give {option}."
             )
-        return np.array([usual if value is None else abs(value) for value in in_file])
+        return np.array([usual if value is None else value for value in values])
 
-    if endless := [joint.name for joint in arm.joints if joint.limits is None]:
+    ends = [max(map(abs, joint.limits)) if joint.limits else None for joint in arm.joints]
+    usable = possible("position", "rad", _LARGEST_POSITION, ends)
+    if endless := [joint.name for joint, end in zip(arm.joints, usable, strict=True) if end is None]:
         remarks.append(
             f"The file has no usable position limits of {among(endless)}: -2 pi to 2 pi is assumed; give each a lower"
             " and an upper one there, or correct the range in arm.xml."
         )
-    ranges = np.array([joint.limits or (-_ENDLESS, _ENDLESS) for joint in arm.joints])
+    elif max(filter(None, usable)) < np.deg2rad(_LARGEST_POSITION):
+        remarks.append(
+            f"All joints have position limits within {max(filter(None, usable)):.2g} rad: perhaps they are radians that"
+            ' were taken for degrees. In an MJCF file, <compiler angle="radian"/> says what they are.'
+        )
+    ranges = np.array(
+        [
+            joint.limits if joint.limits and end else (-_ENDLESS, _ENDLESS)
+            for joint, end in zip(arm.joints, usable, strict=True)
+        ]
+    )
     speed, torque = [joint.velocity for joint in arm.joints], [joint.effort for joint in arm.joints]
     speeds = settled("velocity", "rad/s", "--qd-max", qd_max, speed, _SPEED)
     accelerations = settled("acceleration", "rad/s^2", "--qdd-max", qdd_max, [None] * n, _ACCELERATION)
     torques = settled("torque", "Nm", "--tau-max", tau_max, torque, _TORQUE)
-    for what, unit, values, largest in (
-        ("position", "rad", np.abs(ranges).max(axis=1), _LARGEST_POSITION),
-        ("velocity", "rad/s", speeds, _LARGEST_SPEED),
-        ("torque", "Nm", torques, _LARGEST_TORQUE),
-    ):
-        beyond = [f"{joint.name} ({v:g} {unit})" for joint, v in zip(arm.joints, values, strict=True) if v > largest]
-        if beyond:
-            remarks.append(
-                f"Implausible {what} limits, perhaps of another unit, correct them in the file or robot.toml:"
-                f" {', '.join(beyond)}."
-            )
     return Limits(ranges[:, 0], ranges[:, 1], speeds, accelerations, torques)

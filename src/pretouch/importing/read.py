@@ -1,21 +1,19 @@
 """Reading of a robot's URDF or MJCF file by MuJoCo, of what MuJoCo does not take of a URDF, and of mesh files."""
 
-import warnings
-from contextlib import suppress
+import re
 from functools import partial
-from io import BytesIO
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
-from urllib.parse import unquote
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
-from trimesh import Trimesh, load_scene
 
 from pretouch.errors import RobotModelError
-from pretouch.extras import MESHES
-from pretouch.importing.tree import LARGEST, NO_MASS, SOLIDS, Beside, RobotTree, Shape, pose
-from pretouch.types import FloatArray
+from pretouch.importing.meshes import MeshFiles
+from pretouch.importing.tree import NO_MASS, SOLIDS, Beside, RobotTree, Shape, pose
 
 _COMPILER = {
     "fusestatic": "false",
@@ -29,17 +27,20 @@ _COMPILER = {
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _LARGEST_M = 5.0
 """Length of an origin beyond which it is taken for one in millimetres [m]."""
-_MESHES = (".stl", ".obj", ".dae")
+_LARGEST_RAD = 6.3
+"""Angle of an origin beyond which it is taken for one in degrees [rad]."""
 
 
-def read_robot(file: Path, folders: tuple[Path, ...] = ()) -> RobotTree:
-    """Read a robot from a URDF or MJCF file. A fault of the file is a RobotModelError that names it.
+def read_robot(file: Path, folders: tuple[Path, ...] = (), arguments: tuple[str, ...] = ()) -> RobotTree:
+    """Read a robot from a URDF, xacro or MJCF file. A fault of the file is a RobotModelError that names it.
 
     Meshes of a URDF are read when they are needed. `folders` hold the ROS packages that it names, or are packages.
+    `arguments` of a xacro file are texts such as prefix:=left_.
     """
     if odd := [folder for folder in folders if not folder.is_dir()]:
         raise RobotModelError(f"The package path {odd[0]} is not a folder: give one that holds ROS packages.")
-    root, beside = _root(file), Beside()
+    beside = Beside()
+    root = _root(file, folders, arguments, beside.remarks)
     if root.tag not in ("mujoco", "robot"):
         raise RobotModelError(
             f"The file {file} starts with <{root.tag}>: give a URDF (<robot>) or an MJCF (<mujoco>) file."
@@ -49,6 +50,7 @@ def read_robot(file: Path, folders: tuple[Path, ...] = ()) -> RobotTree:
         if not spec.joints:
             raise RobotModelError("There is no robot in it, for no joint moves: is it a part of another file?")
         model = spec.compile()
+        _check_bodies(spec, model)
     except RobotModelError as error:
         raise RobotModelError(f"{error} (in {file})") from error
     except ValueError as error:
@@ -59,19 +61,74 @@ def read_robot(file: Path, folders: tuple[Path, ...] = ()) -> RobotTree:
     return RobotTree(name or file.stem, model, beside)
 
 
-def _root(file: Path) -> ET.Element:
-    template = f"Xacro is left in the file {file}: make a URDF of it by `xacro {file.name} -o expanded.urdf` first."
+def _root(file: Path, folders: tuple[Path, ...], arguments: tuple[str, ...], remarks: list[str]) -> ET.Element:
+    """Return the root of a file, expanded if it is a xacro template."""
+    template = False
     try:
-        root = ET.fromstring(file.read_bytes())  # noqa: S314  the user's own file
+        data = file.read_bytes()
+        template = b"xacro:" in data  # where its prefix is not defined, it is no valid XML
+        root = ET.fromstring(data)  # noqa: S314  the user's own file
+        template = _has_xacro(root)
+        if not template:
+            return root
+        root = ET.fromstring(_expanded(data, file, folders, arguments))  # noqa: S314
+        if not _has_xacro(root):
+            remarks.append("The xacro in the file was expanded.")
+            return root
+    except RobotModelError:
+        raise
     except OSError as error:
         raise RobotModelError(f"The file {file} cannot be read: {error.strerror}: give a URDF or MJCF file.") from error
     except (ET.ParseError, ValueError, LookupError) as error:
-        undefined = "unbound prefix" in str(error)
-        raise RobotModelError(template if undefined else f"The file {file} is not valid XML: {error}.") from error
-    for element in root.iter():
-        if "xacro" in str(element.tag) or any("${" in value or "$(" in value for value in element.attrib.values()):
-            raise RobotModelError(template)
-    return root
+        if not (template and "unbound prefix" in str(error)):
+            raise RobotModelError(f"The file {file} is not valid XML: {error}.") from error
+    raise RobotModelError(
+        f"Xacro is left in the file {file}: install xacrodoc by `pip install xacrodoc`, or make a URDF of it by"
+        f" `xacro {file.name} -o expanded.urdf` where ROS is."
+    )
+
+
+def _has_xacro(root: ET.Element) -> bool:
+    """Return whether an element or a value of xacro is anywhere in a file."""
+    words = (str(word) for element in root.iter() for word in (element.tag, *element.attrib, *element.attrib.values()))
+    return any("${" in word or "$(" in word or "xacro}" in word for word in words)
+
+
+def _expanded(data: bytes, file: Path, folders: tuple[Path, ...], arguments: tuple[str, ...]) -> bytes | str:
+    """Return what xacrodoc or xacro makes of a template; without both, the template."""
+    try:
+        values = dict(argument.split(":=", 1) for argument in arguments)
+        if find_spec("xacrodoc"):
+            xacrodoc: Any = import_module("xacrodoc")
+            xacrodoc.packages.reset()
+            xacrodoc.packages.look_in([str(folder) for folder in folders])
+            return str(xacrodoc.XacroDoc.from_file(file, resolve_packages=False, subargs=values).to_urdf_string())
+        if find_spec("xacro"):
+            return str(import_module("xacro").process_file(str(file), mappings=values).toxml())
+    except Exception as error:  # whatever a library makes of a template
+        reason = " ".join(str(error).split())
+        raise RobotModelError(
+            f"The xacro in {file} cannot be expanded: {reason}: give its arguments by --xacro NAME:=VALUE, and the"
+            " folders of its packages by --package-path."
+        ) from error
+    return data
+
+
+def _check_bodies(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
+    """Refuse lengths and angles of bodies that must be of another unit."""
+    far = (np.abs(np.hstack([model.body_pos, model.body_ipos])).max(axis=1) > _LARGEST_M) & (model.body_parentid > 0)
+    if far.any():
+        name = model.body(int(far.argmax())).name
+        raise RobotModelError(f"{name} is more than {_LARGEST_M:g} m from its parent: give metres, not millimetres.")
+    for body in spec.bodies:
+        turn, quarters = np.abs(body.alt.euler), np.round(np.abs(body.alt.euler) / (np.pi / 2))
+        radians = quarters.any() and turn.max() < _LARGEST_RAD and np.allclose(turn, quarters * np.pi / 2, atol=2e-3)
+        if radians if spec.compiler.degree else turn.max() > _LARGEST_RAD:
+            unit, other = ("degrees", "radians") if spec.compiler.degree else ("radians", "degrees")
+            raise RobotModelError(
+                f"{body.name}: euler is {body.alt.euler.tolist()} {unit}: these seem to be {other}, which <compiler"
+                " angle=...> has to say."
+            )
 
 
 def _note_left_out(model: mujoco.MjModel, remarks: list[str]) -> None:
@@ -84,7 +141,7 @@ def _note_left_out(model: mujoco.MjModel, remarks: list[str]) -> None:
 
 def _urdf(root: ET.Element, beside: Beside, file: Path, folders: tuple[Path, ...]) -> mujoco.MjSpec:
     """Return a URDF without its meshes: these stand in `beside`, as does what MuJoCo does not take of it."""
-    uris = list[str]()
+    uris, files = list[str](), MeshFiles(file, folders, beside.remarks)
     for other in root.findall("mujoco"):
         root.remove(other)
     ET.SubElement(ET.SubElement(root, "mujoco"), "compiler", _COMPILER)
@@ -93,22 +150,18 @@ def _urdf(root: ET.Element, beside: Beside, file: Path, folders: tuple[Path, ...
         _prepare_inertial(link, beside)
     for joint in root.findall("joint"):
         _prepare_joint(joint, beside)
-    _check_finite(root)
+    _check_numbers(root)
     spec = mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
     for geom in list(spec.geoms):
         if geom.type == mujoco.mjtGeom.mjGEOM_MESH:
             mesh = spec.mesh(geom.meshname)
-            read = partial(_scaled_mesh, uris[int(mesh.file)], mesh.scale.copy(), file, folders)
+            read = partial(files.read, uris[int(mesh.file)], mesh.scale.copy())
             shape = Shape(int(geom.type), np.zeros(3), pose(geom.pos, geom.quat), read)
             beside.meshes.setdefault(geom.parent.name, []).append((bool(geom.contype), shape))
             spec.delete(geom)
     for mesh in list(spec.meshes):
         spec.delete(mesh)
     return spec
-
-
-def _scaled_mesh(uri: str, scale: FloatArray, file: Path, folders: tuple[Path, ...]) -> Trimesh:
-    return read_mesh(_find_mesh(uri, file, folders)).apply_scale(scale)
 
 
 def _prepare_shapes(link: ET.Element, uris: list[str]) -> None:
@@ -135,8 +188,8 @@ def _prepare_inertial(link: ET.Element, beside: Beside) -> None:
     mass, inertia = inertial.find("mass"), inertial.find("inertia")
     value = 0.0 if mass is None else float(mass.get("value", 0.0))
     moments = np.array([0.0 if inertia is None else float(inertia.get(key, 0.0)) for key in _INERTIA])
-    principal = np.linalg.eigvalsh(moments[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]])
-    if not value > 0 or principal[0] <= 0:
+    principal = np.linalg.eigvalsh(np.nan_to_num(moments)[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]])
+    if not value > 0 or not np.isfinite(moments).all() or principal[0] <= 0:
         link.remove(inertial)
         beside.mass[link.get("name", "")] = value
     elif principal[2] > (1 + 1e-6) * (principal[0] + principal[1]):
@@ -147,90 +200,37 @@ def _prepare_inertial(link: ET.Element, beside: Beside) -> None:
 
 
 def _prepare_joint(joint: ET.Element, beside: Beside) -> None:
-    """Note what MuJoCo does not take of a joint, take out bounds that are none, and look for other units."""
-    origin, limit, name = joint.find("origin"), joint.find("limit"), joint.get("name", "")
-    if origin is not None:
-        xyz = origin.get("xyz", "0 0 0")
-        if max(abs(float(word)) for word in xyz.split()) > _LARGEST_M:
-            raise RobotModelError(f"{name}: xyz of <origin> is {xyz!r}: give metres; these seem to be millimetres.")
+    """Note the limits of a joint, and take out those of its position: MuJoCo refuses some that mean none."""
+    limit, name = joint.find("limit"), joint.get("name", "")
     if limit is None:
         return
     low, high, speed = (float(limit.get(key, 0.0)) for key in ("lower", "upper", "velocity"))
-    if 0 < abs(speed) < LARGEST:
-        beside.velocity[name] = abs(speed)
-    if joint.get("type") == "continuous" and (low or high):
+    beside.velocity[name] = abs(speed)
+    if joint.get("type") != "continuous":
+        beside.ranges[name] = low, high
+    elif low or high:
         beside.remarks.append(f"The position limits of {name} are not used: it is continuous.")
-    endless = joint.get("type") == "continuous" or not max(abs(low), abs(high)) < LARGEST
-    if endless or not low < high:
-        if not endless:
-            beside.ranges[name] = low, high
-        for key in ("lower", "upper"):
-            limit.attrib.pop(key, None)
+    for key in ("lower", "upper"):
+        limit.attrib.pop(key, None)
 
 
-def _check_finite(root: ET.Element) -> None:
-    """Refuse what MuJoCo takes for a number and is none."""
+def _check_numbers(root: ET.Element) -> None:
+    """Refuse what MuJoCo takes for a number and is none, and origins that must be of another unit."""
     for owner in [*root.findall("link"), *root.findall("joint")]:
         for element in owner.iter():
             for key, text in element.attrib.items():
-                if element.tag != "limit" and {"nan", "inf", "-inf"}.intersection(text.lower().split()):
-                    name = owner.get("name")
-                    raise RobotModelError(f"{name}: {key} of <{element.tag}> is {text!r}: give finite numbers.")
-
-
-def _find_mesh(uri: str, file: Path, folders: tuple[Path, ...]) -> Path:
-    """Return the mesh file that a URDF names: relative to it, by absolute path, or in a ROS package.
-
-    The package `p` of package://p/rest is looked for as the folder `p` in `folders`, or one of them, then in the folder
-    of the URDF and in each above it. A mesh that is not found is a RobotModelError.
-    """
-    scheme, _, name = unquote(uri).replace("\\", "/").rpartition("://")
-    near = file.resolve().parent
-    places = [near / (name.removeprefix("localhost") if scheme == "file" else name)]
-    way_out = f"put it at {places[0]}, where the URDF says"
-    if scheme in ("package", "model"):
-        package, _, rest = name.partition("/")
-        around = [*folders, near, *near.parents]
-        places = [folder / name for folder in around] + [folder / rest for folder in around if folder.name == package]
-        way_out = f"give --package-path the folder that holds the package {package}"
-    for place in places:
-        with suppress(OSError, ValueError):  # a name may be too long, or none
-            if place.is_file():
-                return place
-    raise RobotModelError(f"The mesh {uri} was not found: {way_out}.")
-
-
-def read_mesh(path: Path) -> Trimesh:
-    """Read a mesh file, as its suffix says, in metres. What is wrong with it is a RobotModelError that names it.
-
-    Nothing but the file itself is read: no materials or textures beside it.
-    """
-    suffix = path.suffix.lower()
-    if suffix not in _MESHES:
-        raise RobotModelError(f"The mesh {path} has an unknown format: use {', '.join(_MESHES)}.")
-    if suffix == ".dae":
-        MESHES.need(f"The mesh {path}, a COLLADA file,")
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            warnings.filterwarnings("error", "string or file could not be read")  # NumPy would leave the rest out
-            data = path.read_bytes()
-            if suffix == ".obj":
-                _check_obj(data)
-            scene = load_scene(BytesIO(data), suffix[1:], process=False)
-            mesh = (scene.convert_units("meters") if scene.units else scene).to_mesh()
-    except Exception as error:  # whatever a library makes of a broken file
-        reason = " ".join(str(error).split())[:200] or type(error).__name__
-        raise RobotModelError(f"The mesh {path} is damaged: {reason}.") from error
-    if not len(mesh.faces) or not np.isfinite(mesh.triangles).all() or not np.any(mesh.triangles_cross):
-        raise RobotModelError(
-            f"The mesh {path} holds no triangle with an area and finite corners, or is truncated: give a complete file."
-        )
-    return mesh
-
-
-def _check_obj(data: bytes) -> None:
-    """Refuse corners counted backwards or from 0: trimesh 5.2 takes them for other ones."""
-    faces = (line.split()[1:] for line in data.splitlines() if line.startswith(b"f "))
-    if any(int(corner.split(b"/")[0]) < 1 for face in faces for corner in face):
-        raise ValueError("its faces do not count their corners from 1 onwards: save it anew by another program")
+                words, fault = text.lower().split(), ""
+                if element.tag != "limit" and {"nan", "inf", "-inf"}.intersection(words):
+                    fault = "give finite numbers"
+                elif key in ("xyz", "rpy", "value", "size") and re.search(r"\d,\d", text):
+                    fault = "give decimal points, and spaces between numbers"
+                elif (
+                    key == "xyz"
+                    and element.tag == "origin"
+                    and max(map(abs, map(float, words)), default=0) > _LARGEST_M
+                ):
+                    fault = "give metres; these seem to be millimetres"
+                elif key == "rpy" and max(map(abs, map(float, words)), default=0) > _LARGEST_RAD:
+                    fault = "give radians, less than a turn; these seem to be degrees"
+                if fault:
+                    raise RobotModelError(f"{owner.get('name')}: {key} of <{element.tag}> is {text!r}: {fault}.")

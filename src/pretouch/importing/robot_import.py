@@ -38,6 +38,8 @@ class ImportOptions:
     """Name of the arm; by default the file's."""
     package_path: tuple[Path, ...] = ()
     """Folders that hold the ROS packages of package:// paths; those above the file are searched in any case."""
+    xacro: tuple[str, ...] = ()
+    """Arguments of a xacro file, such as prefix:=left_."""
     qd_max: tuple[float, ...] = ()
     """Joint velocity limits [rad/s], one for all or one for each; by default the file's."""
     qdd_max: tuple[float, ...] = ()
@@ -71,7 +73,7 @@ def import_robot(file: Path, options: ImportOptions) -> Imported:
     """Read an arm, fit capsules, and propose what the file does not hold. Foreseeable misuse is a RobotModelError."""
     if not 1 <= options.capsules <= 10:
         raise RobotModelError(f"--capsules is {options.capsules}: give 1 to 10 for one link.")
-    robot = read_robot(file, options.package_path)
+    robot = read_robot(file, options.package_path, options.xacro)
     arm = arm_of(robot, options.ee)
     limits = limits_of(arm, options.qd_max, options.qdd_max, options.tau_max)
     if options.ready:

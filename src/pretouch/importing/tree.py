@@ -13,7 +13,7 @@ from pretouch.errors import RobotModelError
 from pretouch.types import FloatArray
 
 _KINDS = {int(mujoco.mjtJoint.mjJNT_HINGE): "hinge", int(mujoco.mjtJoint.mjJNT_SLIDE): "slide"}
-LARGEST = 1e6
+_LARGEST = 1e6
 """From here on a limit stands for none."""
 NO_MASS = 1e-12
 """Mass and inertia in the model of a link without mass [kg, kg m^2]: MuJoCo moves no link without."""
@@ -103,9 +103,9 @@ class Beside:
     """Facts of a URDF that MuJoCo's model does not contain."""
 
     velocity: dict[str, float] = field(default_factory=dict)
-    """Speed limits of joints [rad/s]."""
+    """Speed limits of joints, as the file has them [rad/s]."""
     ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
-    """Position limits between which a joint cannot move [rad]."""
+    """Position limits of joints, as the file has them [rad]."""
     mass: dict[str, float] = field(default_factory=dict)
     """Masses of links whose inertia is missing or impossible [kg]."""
     meshes: dict[str, list[tuple[bool, Shape]]] = field(default_factory=dict)
@@ -166,12 +166,17 @@ class RobotTree:
 
     def _joint(self, j: int) -> Joint:
         m, name = self.model, self.model.joint(j).name or f"joint{j + 1}"
-        low, high = (float(v) for v in m.jnt_range[j])
-        limits = (low, high) if m.jnt_limited[j] and max(-low, high) < LARGEST else self.beside.ranges.get(name)
+        low, high = map(float, m.jnt_range[j])
+        limits = (low, high) if m.jnt_limited[j] else self.beside.ranges.get(name)
         coupled = (m.eq_type == mujoco.mjtEq.mjEQ_JOINT) & (m.eq_obj1id == j) & (m.eq_obj2id >= 0)
-        velocity = self.beside.velocity.get(name)
         return Joint(
-            name, j, _KINDS.get(int(m.jnt_type[j]), "other"), limits, velocity, self._effort(j), bool(coupled.any())
+            name,
+            j,
+            _KINDS.get(int(m.jnt_type[j]), "other"),
+            limits if limits and all(abs(v) < _LARGEST for v in limits) else None,
+            _limit(self.beside.velocity.get(name, 0.0)),
+            self._effort(j),
+            bool(coupled.any()),
         )
 
     def _effort(self, j: int) -> float | None:
@@ -182,8 +187,7 @@ class RobotTree:
             of_it = m.actuator_trntype[a] == mujoco.mjtTrn.mjTRN_JOINT and m.actuator_trnid[a, 0] == j
             if of_it and m.actuator_forcelimited[a]:
                 limits.append(np.abs(m.actuator_forcerange[a]).max() * abs(m.actuator_gear[a, 0]))
-        least = float(min(limits, default=0.0))
-        return least if 0 < least < LARGEST else None
+        return _limit(float(min(limits, default=0.0)))
 
     def _shape(self, g: int) -> Shape:
         m, T = self.model, pose(self.model.geom_pos[g], self.model.geom_quat[g])
@@ -193,6 +197,11 @@ class RobotTree:
         corners = m.mesh_vert[m.mesh_vertadr[mesh] :][: m.mesh_vertnum[mesh]]
         faces = m.mesh_face[m.mesh_faceadr[mesh] :][: m.mesh_facenum[mesh]]
         return Shape(int(m.geom_type[g]), m.geom_size[g].copy(), T, lambda: Trimesh(corners, faces, process=False))
+
+
+def _limit(value: float) -> float | None:
+    """Return a limit of a file, None for a number that means none: zero, infinite, or as large as no limit is."""
+    return value if 0 < value < _LARGEST else None
 
 
 def pose(position: FloatArray, quaternion: FloatArray) -> FloatArray:
