@@ -30,6 +30,7 @@ COMMANDS: dict[str, dict[str, tuple[str, str]]] = {
         "skin check-unit": ("skin_check:CheckUnit", "with a card: bursts, delay, order of zones"),
         "skin calibrate": ("calibrate.command:Calibrate", "find where units sit, from a motion"),
         "skin coverage": ("skin_coverage:MeasureCoverage", "what units see in time, where more help"),
+        "skin import": ("robot:ImportSkin", "units of a URDF, or of a table of poses"),
         "skin simulate": ("skin_simulate:Simulate", "send what real units send"),
         "skin provision": ("skin_keys:Provision", "set up a unit over USB"),
         "skin keys": ("skin_keys:ListKeys", "list, add or revoke the keys of units"),

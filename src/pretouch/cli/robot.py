@@ -1,24 +1,27 @@
-"""`pretouch robot import` and `check`: the report on an arm's file, capsules and assumptions."""
+"""`pretouch robot import` and `check`, `skin import`: arms and skins of other programs, and reports on them."""
 
 import re
+import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+import numpy as np
 import tyro
 from rich.console import Console
 
 from pretouch.cli.options import JsonFile, OptionalFile
 from pretouch.cli.tables import show
-from pretouch.cli.writing import numbers_to
+from pretouch.cli.writing import check_outputs, numbers_to
 from pretouch.errors import RobotModelError
 from pretouch.importing.capsules import LinkBody
 from pretouch.importing.read import read_robot
 from pretouch.importing.ready import Ready, check_posture, never_apart, rated
 from pretouch.importing.robot_import import ImportOptions, check_free, import_robot, write_folder
-from pretouch.robot.description import FILE, load_description
+from pretouch.importing.skin import BEAMS, chosen, fixed_links, mounted, rows_of_links, rows_of_table
+from pretouch.robot.description import FILE, load_description, robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import OWN_SKIN, load_skin
+from pretouch.sensing.skin import OWN_SKIN, Skin, load_skin, save_skin
 from pretouch.text_table import TextTable, tabulated
 
 _NEGLIGIBLE = 0.001
@@ -33,7 +36,7 @@ class ImportArm(ImportOptions):
     """
 
     file: tyro.conf.Positional[Path]
-    """URDF file (not a xacro template) or MJCF file."""
+    """URDF, xacro or MJCF file; a xacro file needs the package xacrodoc or xacro."""
     out: OptionalFile = None
     """Folder to write robot.toml and arm.xml to; by default the arm's name."""
     json: JsonFile = None
@@ -42,7 +45,7 @@ class ImportArm(ImportOptions):
         """Import an arm, print a report, and write its folder."""
         folder = self.out
         if not folder:  # of the arm's name: letters, digits, dashes and dots only
-            name = self.name or read_robot(self.file, self.package_path).name
+            name = self.name or read_robot(self.file, self.package_path, self.xacro).name
             folder = Path(re.sub(r"[^A-Za-z0-9_.-]+", "-", name).strip("-.")[:60] or "arm")
         check_free(folder)
         with numbers_to(self.json) as write:
@@ -156,3 +159,78 @@ def ready_said(ready: Ready) -> str:
         f"Ready posture: smallest singular value {ready.singular_value:.3g}, {1000 * ready.clear:.0f} mm clear of"
         " itself."
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportSkin:
+    """Make a skin file of units that are links of a URDF, or poses in a CSV or YAML file, and say where each looks."""
+
+    file: tyro.conf.Positional[Path]
+    """URDF, xacro or MJCF file with the units as links that are fixed to the arm's; or a CSV or YAML file of poses."""
+    arm: str = "panda"
+    """The arm that wears them: panda, fr3, or the folder of an imported arm."""
+    links: str = ""
+    """Names of the units' links, or patterns such as 'prox_*', separated by commas; by default they are asked for."""
+    sensor: str = "vl53l1x"
+    """Type of their sensors, where the file says none: vl53l1x, vl53l5cx, vl53l7cx or capacitive."""
+    beam: Literal["z", "x", "y", "-x", "-y", "-z"] = "z"
+    """Axis of the units' frames along which they look: x for frames of ROS that are not optical."""
+    package_path: Paths = ()
+    """Folders that hold ROS packages, separated by commas."""
+    xacro: Words = ()
+    """Arguments of a xacro file, as NAME:=VALUE, separated by commas."""
+    out: Path = Path(OWN_SKIN)
+    """Skin file to write; skin.toml in an imported arm's folder is the arm's own."""
+    json: JsonFile = None
+    replace: bool = False
+    """Overwrite existing files."""
+
+    def run(self) -> None:
+        """Read the units, show them, and write the skin file."""
+        model = RobotModel(robot_named(self.arm))
+        check_outputs([("skin file", self.out), ("file", self.json)], [self.file], self.replace)
+        with numbers_to(self.json) as write:
+            write(_imported_skin(self, model))
+
+
+def _imported_skin(command: ImportSkin, model: RobotModel) -> dict[str, Any]:
+    """Read units, print where they look, write them as a skin file, and return the numbers."""
+    if command.file.suffix.lower() in (".csv", ".tsv", ".txt", ".yaml", ".yml"):
+        rows = rows_of_table(command.file, model, command.sensor)
+    else:
+        robot = read_robot(command.file, command.package_path, command.xacro)
+        names = chosen(fixed_links(robot), command.links, input if sys.stdin.isatty() else None)
+        rows = rows_of_links(robot, model, names, command.sensor)
+    units = [mounted(row, model, command.beam) for row in rows]
+    kin, sentences = model.kinematics(model.description.q_ready), list[str]()
+    columns = (
+        ("unit", lambda one: one.unit.id),
+        ("link", lambda one: one.unit.link),
+        ("sensor", lambda one: one.unit.sensor.label),
+        ("position\n[m]", lambda one: _vector(one.unit.T_link_sensor[:3, 3], 3)),
+        ("looks along,\nin the link", lambda one: _vector(one.unit.T_link_sensor[:3, 2], 2)),
+        (
+            "in the\nbase",
+            lambda one: _vector(kin.rotation[model.link_index(one.unit.link)] @ one.unit.T_link_sensor[:3, 2], 2),
+        ),
+        ("off normal\n[deg]", lambda one: f"{np.rad2deg(np.arccos(np.clip(one.outward, -1, 1))):.0f}"),
+    )
+    note = "In the base: in the ready posture. Off normal: angle from the outward normal of the link's capsule."
+    if inward := [one.unit.id for one in units if one.outward <= 0]:
+        outward = {beam: sum(mounted(row, model, beam).outward > 0 for row in rows) for beam in BEAMS}
+        best = max(BEAMS, key=lambda beam: outward[beam])
+        other = f" With --beam={best}, {outward[best]} of {len(rows)} look outwards." if best != command.beam else ""
+        sentences.append(f"Look into the arm: {', '.join(inward)}.{other}")
+    if raised := [f"{one.unit.id} by {1000 * one.raised:.1f} mm" for one in units if one.raised]:
+        sentences.append(f"Raised to the surface of the capsules, which stand over the arm's: {', '.join(raised)}.")
+    console = Console(highlight=False)
+    show(console, [tabulated(f"{len(units)} units on {model.description.name}", columns, units, note, 3)])
+    for sentence in sentences:
+        console.print(f"- {sentence}", markup=False, soft_wrap=True)
+    save_skin(Skin([one.unit for one in units], model), command.out)
+    console.print(f"Skin: {command.out}", markup=False, soft_wrap=True)
+    return {"arm": model.description.name, "units": units, "remarks": sentences}
+
+
+def _vector(values: np.ndarray, digits: int) -> str:
+    return " ".join(f"{value:.{digits}f}" for value in values)

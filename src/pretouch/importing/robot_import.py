@@ -39,7 +39,7 @@ class ImportOptions:
     package_path: tuple[Path, ...] = ()
     """Folders that hold the ROS packages of package:// paths; those above the file are searched in any case."""
     xacro: tuple[str, ...] = ()
-    """Arguments of a xacro file, such as prefix:=left_."""
+    """Arguments of a xacro file, as NAME:=VALUE."""
     qd_max: tuple[float, ...] = ()
     """Joint velocity limits [rad/s], one for all or one for each; by default the file's."""
     qdd_max: tuple[float, ...] = ()
