@@ -68,6 +68,7 @@ def files(tmp_path_factory, panda_model, paper_skin):
             recording.record(arm.turn(tuple(sample)))
     told = ["robot", "import", str(written(folder, six_axis())), "--capsules", "1", "--ready", "0,0.3,1.2,0,1.6,0"]
     assert cli.main([*told, "--out", str(folder / "arm")]) == 0
+    written(folder, "a: {link: link3, position: [0.06, 0, 0.1], normal: [1, 0, 0]}", "units.yaml")
     assert cli.main(["skin", "keys", "--keys", str(folder / "keys.toml"), "--new", "a,b"]) == 0
     return folder
 
@@ -78,7 +79,7 @@ def files(tmp_path_factory, panda_model, paper_skin):
         ("skin keys --keys keys.toml", {"units"}),
         ("skin monitor --keys keys.toml --port 0 --duration 0.3", {"elapsed_s", "units", "findings"}),
         ("skin coverage --postures 2", {"links", "blind_spots"}),
-        ("robot check arm", {"joints", "ready", "arm"}),
+        ("skin import units.yaml --arm arm --out skin.toml", {"arm", "units", "remarks"}),
         ("detect force.csv --profiles paper,blind", {"first_sample_s", "profiles"}),
         ("replay run.mcap --no-page", {"contacts", "held_share", "duration_s"}),
         ("replay run.mcap --verify", {"verified"}),

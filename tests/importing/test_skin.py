@@ -10,9 +10,10 @@ from pretouch.cli import main
 from pretouch.errors import SkinError
 from pretouch.importing.read import read_robot
 from pretouch.importing.robot_import import ImportOptions, import_robot, write_folder
-from pretouch.importing.skin import chosen, fixed_links, mounted, rows_of_links, rows_of_table
+from pretouch.importing.skin import chosen, fixed_links, mounted, units_of_links, units_of_table
 from pretouch.robot.description import load_description, panda
 from pretouch.robot.model import RobotModel
+from pretouch.sensing.sensor import PAPER_SENSOR
 from pretouch.sensing.skin import load_skin, paper_skin
 
 READY = "0,0.3,1.2,0,1.6,0"
@@ -54,7 +55,7 @@ def test_units_of_a_urdf_are_where_it_has_them(tmp_path, arm, model, capsys):
     assert [pose[:3, 3].tolist() for pose in poses] == [pytest.approx([x, 0, 0.1], abs=1e-4) for x in (0.06, -0.06)]
     assert [pose[:3, 2].tolist() for pose in poses] == [pytest.approx([x, 0, 0], abs=1e-4) for x in (1, -1)]
     assert "Look into the arm" not in capsys.readouterr().out
-    assert json.loads((tmp_path / "n").read_text())["units"][0][2] == pytest.approx(1, abs=0.01)
+    assert json.loads((tmp_path / "n").read_text())["units"][0]["outward"] == pytest.approx(1, abs=0.01)
 
 
 def test_a_unit_that_looks_inwards_is_named_with_the_axis_that_looks_outwards(tmp_path, arm, capsys):
@@ -90,7 +91,7 @@ def test_units_are_chosen_by_patterns_numbers_or_an_answer(tmp_path):
 def test_a_unit_on_a_link_that_the_arm_lacks_is_refused(tmp_path, model):
     robot = read_robot(written(tmp_path, six_axis(units("other") + link("other", BOX) + joint("o", "link6", "other"))))
     with pytest.raises(SkinError, match=r"prox_1 is fixed to other, which sixer does not have: import .* link6, tool0"):
-        rows_of_links(robot, model, ["prox_1"], "vl53l1x")
+        units_of_links(robot, model, ["prox_1"], PAPER_SENSOR)
 
 
 def test_a_unit_within_its_links_capsule_is_raised_and_one_deep_inside_is_refused(tmp_path, arm, capsys):
@@ -126,7 +127,7 @@ TABLES = [
 
 @pytest.mark.parametrize(("suffix", "text"), TABLES)
 def test_poses_of_tables_are_read_by_the_names_that_people_give_them(tmp_path, model, suffix, text):
-    (row,) = rows_of_table(written(tmp_path, text, f"units.{suffix}"), model, "vl53l1x")
+    (row,) = units_of_table(written(tmp_path, text, f"units.{suffix}"), model, PAPER_SENSOR)
     one = mounted(row, model, "z")
     assert (one.unit.id, one.unit.link, one.raised) == ("a", "link3", 0.0)
     assert one.unit.T_link_sensor[:3, 2:] == pytest.approx(np.array([[1, 0.06], [0, 0], [0, 0.1]]), abs=1e-6)
@@ -149,7 +150,7 @@ def test_poses_of_tables_are_read_by_the_names_that_people_give_them(tmp_path, m
         (
             "yaml",
             "a: {link: link3, xyz: [0.06, 0, 0.1], orientation: [0, 1, 0, 1]}",
-            "4 numbers: .* quaternion_wxyz or",
+            "4 numbers, not 3: name a quaternion quaternion_wxyz or",
         ),
         (
             "yaml",
@@ -161,7 +162,7 @@ def test_poses_of_tables_are_read_by_the_names_that_people_give_them(tmp_path, m
 )
 def test_a_table_that_is_not_right_is_refused_with_the_place(tmp_path, model, suffix, text, sentence):
     with pytest.raises(SkinError, match=sentence):
-        rows_of_table(written(tmp_path, text, f"units.{suffix}"), model, "vl53l1x")
+        units_of_table(written(tmp_path, text, f"units.{suffix}"), model, PAPER_SENSOR)
 
 
 def test_the_papers_skin_comes_back_from_a_table_of_its_poses(tmp_path):
@@ -172,7 +173,7 @@ def test_the_papers_skin_comes_back_from_a_table_of_its_poses(tmp_path):
         for unit in skin.mounted
     )
     model = RobotModel(panda())
-    found = rows_of_table(written(tmp_path, text, "s.yaml"), model, "vl53l1x")
+    found = units_of_table(written(tmp_path, text, "s.yaml"), model, PAPER_SENSOR)
     for row, unit in zip(found, skin.mounted, strict=True):
         one = mounted(row, model, "z")
         assert one.unit.T_link_sensor[:3, 2:] == pytest.approx(unit.T_link_sensor[:3, 2:], abs=1e-9)

@@ -28,16 +28,15 @@ COMMANDS: dict[str, dict[str, tuple[str, str]]] = {
     "Sensor units": {
         "skin monitor": ("skin_monitor:Monitor", "watch units: rates, losses, batteries, faults"),
         "skin check-unit": ("skin_check:CheckUnit", "with a card: bursts, delay, order of zones"),
-        "skin calibrate": ("calibrate.command:Calibrate", "find where units sit, from a motion"),
+        "skin calibrate": ("calibrate:Calibrate", "find where units sit, from a motion"),
         "skin coverage": ("skin_coverage:MeasureCoverage", "what units see in time, where more help"),
         "skin import": ("robot:ImportSkin", "units of a URDF, or of a table of poses"),
-        "skin simulate": ("skin_simulate:Simulate", "send what real units send"),
+        "skin simulate": ("skin_check:Simulate", "send what real units send"),
         "skin provision": ("skin_keys:Provision", "set up a unit over USB"),
         "skin keys": ("skin_keys:ListKeys", "list, add or revoke the keys of units"),
     },
     "Arm": {
         "robot import": ("robot:ImportArm", "your own arm, from URDF or MJCF"),
-        "robot check": ("robot:CheckArm", "check an imported arm after a change by hand"),
         "identify": (extras.LAB, "offsets, friction and noise of an arm"),
         "serve-fci": (extras.FCI, "a simulated Franka for programs that use libfranka"),
     },

@@ -1,10 +1,10 @@
-"""`pretouch robot import` and `check`, `skin import`: arms and skins of other programs, and reports on them."""
+"""`pretouch robot import` and `skin import`: arms and skins of other programs, and reports on them."""
 
 import re
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, get_args
 
 import numpy as np
 import tyro
@@ -13,15 +13,15 @@ from rich.console import Console
 from pretouch.cli.options import JsonFile, OptionalFile
 from pretouch.cli.tables import show
 from pretouch.cli.writing import check_outputs, numbers_to
-from pretouch.errors import RobotModelError
 from pretouch.importing.capsules import LinkBody
 from pretouch.importing.read import read_robot
-from pretouch.importing.ready import Ready, check_posture, never_apart, rated
+from pretouch.importing.ready import Ready
 from pretouch.importing.robot_import import ImportOptions, check_free, import_robot, write_folder
-from pretouch.importing.skin import BEAMS, chosen, fixed_links, mounted, rows_of_links, rows_of_table
-from pretouch.robot.description import FILE, load_description, robot_named
+from pretouch.importing.skin import Beam, chosen, fixed_links, mounted, units_of_links, units_of_table
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import OWN_SKIN, Skin, load_skin, save_skin
+from pretouch.sensing.sensor import sensor_called
+from pretouch.sensing.skin import OWN_SKIN, Skin, save_skin
 from pretouch.text_table import TextTable, tabulated
 
 _NEGLIGIBLE = 0.001
@@ -74,7 +74,9 @@ def _imported(file: Path, options: ImportOptions, folder: Path) -> dict[str, Any
     units = f"pretouch skin coverage --arm {folder} --workspace joints --suggest 8 --out {folder / OWN_SKIN}"
     after = f"Next, sensor units: {units}\nThen try it: pretouch live --arm {folder}"
     console.print(f"\nWritten: {folder}. {after}", markup=False, soft_wrap=True)
-    return arm_numbers(model, ready) | {"links": imported.bodies, "remarks": imported.remarks}
+    limits = {"joints": model.joints, "q_min": model.q_min, "q_max": model.q_max}
+    parts = {"arm": model.description, "ready": ready, "links": imported.bodies, "remarks": imported.remarks}
+    return parts | limits
 
 
 def _capsules(bodies: tuple[LinkBody, ...]) -> TextTable:
@@ -89,53 +91,6 @@ def _capsules(bodies: tuple[LinkBody, ...]) -> TextTable:
         " outside of them; a person may be closer by that much."
     )
     return tabulated("Capsules for the links", columns, bodies, note, 1)
-
-
-@dataclass(frozen=True)
-class CheckArm:
-    """Check an arm's folder after a change by hand, and report what is wrong with it."""
-
-    folder: tyro.conf.Positional[Path]
-    """Folder of the arm, or its robot.toml."""
-    skin: OptionalFile = None
-    """Skin file; by default the folder's own."""
-    json: JsonFile = None
-
-    def run(self) -> None:
-        """Load an arm and its skin, and print their facts; a fault is an error of this package."""
-        with numbers_to(self.json) as write:
-            write(_checked(self))
-
-
-def _checked(command: CheckArm) -> dict[str, Any]:
-    description = load_description(command.folder)
-    file = command.folder / FILE if command.folder.is_dir() else command.folder
-    try:
-        model = RobotModel(description)
-    except RobotModelError as error:
-        raise RobotModelError(f"{error} (in {file}, or its {description.mjcf.name})") from error
-    check_posture(description.q_ready, model.q_min, model.q_max, f"{file}: q_ready")
-    ready = rated(model, description.q_ready)
-    own = file.parent / OWN_SKIN
-    skin = load_skin(command.skin or own, model) if command.skin or own.exists() else None
-    together = ", ".join(f"{a} and {b}" for a, b in never_apart(model)) or "none"
-    note = (
-        f"{len(model.capsules.radius)} capsules, {len(model.body.radius)} of them on moving links. {ready_said(ready)}"
-        f" Units: {', '.join(skin.ids) if skin else 'no skin file'}. Pairs of links that always touch, so they are not"
-        f" checked: {together}."
-    )
-    console = Console(highlight=False)
-    show(console, [joint_table(model, ready, note)])
-    if ready.conflict:
-        raise RobotModelError(f"{ready.conflict} ({file}: q_ready)")
-    console.print(f"No problem found: {command.folder}.", markup=False, soft_wrap=True)
-    return arm_numbers(model, ready) | {"units": skin.ids if skin else None}
-
-
-def arm_numbers(model: RobotModel, ready: Ready) -> dict[str, Any]:
-    """Return the facts of an arm and its ready posture, for JSON."""
-    limits = {"joints": model.joints, "q_min": model.q_min, "q_max": model.q_max}
-    return {"arm": model.description, "ready": ready, "never_apart": never_apart(model)} | limits
 
 
 def joint_table(model: RobotModel, ready: Ready, note: str) -> TextTable:
@@ -173,7 +128,7 @@ class ImportSkin:
     """Names of the units' links, or patterns such as 'prox_*', separated by commas; by default they are asked for."""
     sensor: str = "vl53l1x"
     """Type of their sensors, where the file says none: vl53l1x, vl53l5cx, vl53l7cx or capacitive."""
-    beam: Literal["z", "x", "y", "-x", "-y", "-z"] = "z"
+    beam: Beam = "z"
     """Axis of the units' frames along which they look: x for frames of ROS that are not optical."""
     package_path: Paths = ()
     """Folders that hold ROS packages, separated by commas."""
@@ -195,12 +150,13 @@ class ImportSkin:
 
 def _imported_skin(command: ImportSkin, model: RobotModel) -> dict[str, Any]:
     """Read units, print where they look, write them as a skin file, and return the numbers."""
+    sensor = sensor_called(command.sensor, "--sensor", {})
     if command.file.suffix.lower() in (".csv", ".tsv", ".txt", ".yaml", ".yml"):
-        rows = rows_of_table(command.file, model, command.sensor)
+        rows = units_of_table(command.file, model, sensor)
     else:
         robot = read_robot(command.file, command.package_path, command.xacro)
         names = chosen(fixed_links(robot), command.links, input if sys.stdin.isatty() else None)
-        rows = rows_of_links(robot, model, names, command.sensor)
+        rows = units_of_links(robot, model, names, sensor)
     units = [mounted(row, model, command.beam) for row in rows]
     kin, sentences = model.kinematics(model.description.q_ready), list[str]()
     columns = (
@@ -217,8 +173,8 @@ def _imported_skin(command: ImportSkin, model: RobotModel) -> dict[str, Any]:
     )
     note = "In the base: in the ready posture. Off normal: angle from the outward normal of the link's capsule."
     if inward := [one.unit.id for one in units if one.outward <= 0]:
-        outward = {beam: sum(mounted(row, model, beam).outward > 0 for row in rows) for beam in BEAMS}
-        best = max(BEAMS, key=lambda beam: outward[beam])
+        outward = {beam: sum(mounted(row, model, beam).outward > 0 for row in rows) for beam in get_args(Beam)}
+        best = max(outward, key=lambda beam: outward[beam])
         other = f" With --beam={best}, {outward[best]} of {len(rows)} look outwards." if best != command.beam else ""
         sentences.append(f"Look into the arm: {', '.join(inward)}.{other}")
     if raised := [f"{one.unit.id} by {1000 * one.raised:.1f} mm" for one in units if one.raised]:

@@ -17,8 +17,8 @@ _NAMES = ("tcp", "tool", "grasp", "ee", "eef", "effector", "tip")
 _ENDLESS = 2 * np.pi
 _SPEED, _ACCELERATION, _TORQUE = 1.0, 5.0, 50.0
 """Where nothing is known: slow, gentle and middling [rad/s, rad/s^2, Nm]."""
-_LARGEST_POSITION, _LARGEST_SPEED, _LARGEST_TORQUE = 4 * np.pi, 30.0, 5000.0
-"""Limits that no joint of an arm exceeds [rad, rad/s, Nm]: larger ones count as none."""
+_LARGEST = {"position": 4 * np.pi, "velocity": 30.0, "acceleration": np.inf, "torque": 5000.0}
+"""Limits that no joint of an arm exceeds [rad, rad/s, rad/s^2, Nm]: larger ones count as none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +142,19 @@ class Limits:
     """(n,) [Nm]."""
 
 
+def _possible(arm: ArmChain, what: str, unit: str, largest: float, values: list[float | None]) -> list[float | None]:
+    """Return limits without those that no joint of an arm has, which are named."""
+    pairs = zip(arm.joints, values, strict=True)
+    if beyond := [f"{joint.name} ({v:.6g} {unit})" for joint, v in pairs if v and v > largest]:
+        several = len(beyond) > 1 and "rad" in unit
+        guess = "they look like degrees in place of radians" if several else "perhaps they are of another unit"
+        arm.robot.remarks.append(
+            f"The {what} limits of {', '.join(beyond)} are not used, for no joint of an arm has such: {guess}. Correct"
+            " them in the file."
+        )
+    return [v if v and v <= largest else None for v in values]
+
+
 def limits_of(
     arm: ArmChain, qd_max: tuple[float, ...] = (), qdd_max: tuple[float, ...] = (), tau_max: tuple[float, ...] = ()
 ) -> Limits:
@@ -151,18 +164,6 @@ def limits_of(
     def among(names: list[str]) -> str:
         return "all joints" if len(names) == n else ", ".join(names)
 
-    def possible(what: str, unit: str, largest: float, values: list[float | None]) -> list[float | None]:
-        """Name the values that no joint of an arm has, and return None for them."""
-        pairs = zip(arm.joints, values, strict=True)
-        if beyond := [f"{joint.name} ({v:.6g} {unit})" for joint, v in pairs if v and v > largest]:
-            several = len(beyond) > 1 and "rad" in unit
-            guess = "they look like degrees in place of radians" if several else "perhaps they are of another unit"
-            remarks.append(
-                f"The {what} limits of {', '.join(beyond)} are not used, for no joint of an arm has such: {guess}."
-                " Correct them in the file."
-            )
-        return [v if v and v <= largest else None for v in values]
-
     def settled(
         what: str, unit: str, option: str, options: tuple[float, ...], in_file: list[float | None], usual: float
     ) -> FloatArray:
@@ -171,8 +172,7 @@ def limits_of(
             raise RobotModelError(f"{option} is {listed}: give one positive number [{unit}], or {n}, by commas.")
         if options:
             return np.broadcast_to(np.array(options, dtype=np.float64), n).copy()
-        largest = {"velocity": _LARGEST_SPEED, "torque": _LARGEST_TORQUE}.get(what, np.inf)
-        values = possible(what, unit, largest, in_file)
+        values = _possible(arm, what, unit, _LARGEST[what], in_file)
         if missing := [joint.name for joint, value in zip(arm.joints, values, strict=True) if value is None]:
             remarks.append(
                 f"The file has no {what} limit of {among(missing)}: {usual:g} {unit} is assumed; give {option}."
@@ -180,13 +180,13 @@ def limits_of(
         return np.array([usual if value is None else value for value in values])
 
     ends = [max(map(abs, joint.limits)) if joint.limits else None for joint in arm.joints]
-    usable = possible("position", "rad", _LARGEST_POSITION, ends)
+    usable = _possible(arm, "position", "rad", _LARGEST["position"], ends)
     if endless := [joint.name for joint, end in zip(arm.joints, usable, strict=True) if end is None]:
         remarks.append(
             f"The file has no usable position limits of {among(endless)}: -2 pi to 2 pi is assumed; give each a lower"
             " and an upper one there, or correct the range in arm.xml."
         )
-    elif max(filter(None, usable)) < np.deg2rad(_LARGEST_POSITION):
+    elif max(filter(None, usable)) < np.deg2rad(_LARGEST["position"]):
         remarks.append(
             f"All joints have position limits within {max(filter(None, usable)):.2g} rad: perhaps they are radians that"
             ' were taken for degrees. In an MJCF file, <compiler angle="radian"/> says what they are.'

@@ -145,11 +145,3 @@ def pointing(model: RobotModel, kin: Kinematics) -> FloatArray:
     if away > 0.01 and abs(axis @ out) < away / 2:
         return out / away
     return axis if axis @ out >= 0 else -axis
-
-
-def never_apart(model: RobotModel) -> tuple[tuple[str, str], ...]:
-    """Pairs of links that `ever_apart` leaves out altogether: no capsules of theirs come apart."""
-    pairs = model.capsules.link[model.apart]
-    apart = {(int(a), int(b)) for a, b in pairs[ever_apart(model)]}
-    rest = sorted({(int(a), int(b)) for a, b in pairs} - apart)
-    return tuple((model.links[a], model.links[b]) for a, b in rest)

@@ -3,17 +3,19 @@
 import csv
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
-from ruamel.yaml import YAML, YAMLError
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
 
 from pretouch.errors import SkinError
 from pretouch.importing.tree import RobotTree, pose
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.sensor import sensor_called
+from pretouch.sensing.sensor import Sensor, sensor_called
 from pretouch.sensing.unit import SensorUnit, seat
 from pretouch.types import FloatArray
 
@@ -28,33 +30,21 @@ _TEXTS = {
     "sensor": ("sensor", "sensor_type", "type", "model"),
 }
 """Keys of texts, those of other programs too."""
-_NUMBERS = {
-    "p": r"(?:(?:.*_)?(?:pose|pos|position|translation|origin|location|xyz)_|[pt]_?)?([xyz])",
-    "q": r"(?:.*_)?(?:(?:q|quat|quaternion|rotation|orientation)_|q)([wxyz])",
-    "a": r"(?:.*_)?(roll|pitch|yaw)",
-    "n": r"(?:.*_)?(?:(?:n|normal|direction|beam)_|n)([xyz])",
+_KINDS = {
+    "position": ("", "p", "t", "pos", "pose", "position", "translation", "location", "origin", "xyz"),
+    "quaternion": ("q", "quat", "quaternion", "orientation", "rotation", "wxyz", "xyzw"),
+    "beam": ("n", "normal", "direction", "beam"),
 }
-"""Keys of positions, quaternions, angles and beams, without their units."""
-_PARTS = {"p": "xyz", "q": "wxyz", "a": ("roll", "pitch", "yaw"), "n": "xyz"}
+"""Words before x, y, z and w in keys, as in pos_x_mm, px or orientation_w."""
+_PARTS = {"position": "xyz", "quaternion": "wxyz", "angles": ("roll", "pitch", "yaw"), "beam": "xyz"}
 _LISTS = {"wxyz": "wxyz", "xyzw": "xyzw", "rpy": ("roll", "pitch", "yaw")}
-"""Ends of the keys of lists, and the keys of their parts; those of other lists are x, y and z."""
-_OF_POSES = re.compile(r"pos|origin|translation|location|orientation|rotation|quat|rpy|xyz|normal|beam|direction")
-_UNIT = re.compile(r"(.*?)(?:_(mm|cm|m|deg|rad))?")
-BEAMS = ("z", "x", "y", "-x", "-y", "-z")
-"""Axes of a unit's frame along which it may look."""
+"""Words at the ends of the keys of lists, and the parts of these; other lists are x, y and z."""
+Beam = Literal["z", "x", "y", "-x", "-y", "-z"]
+"""Axis of a unit's frame along which it looks."""
 
 
-class Row(NamedTuple):
-    """A unit as another program has it."""
-
-    id: str
-    link: str
-    sensor: str
-    T: FloatArray
-    """(4, 4) pose of its frame on the link."""
-
-
-class ImportedUnit(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class ImportedUnit:
     """A unit on the arm."""
 
     unit: SensorUnit
@@ -87,9 +77,9 @@ def chosen(names: dict[str, str], patterns: str, ask: Callable[[str], str] | Non
     return matching
 
 
-def rows_of_links(robot: RobotTree, model: RobotModel, names: list[str], sensor: str) -> list[Row]:
+def units_of_links(robot: RobotTree, model: RobotModel, names: list[str], sensor: Sensor) -> list[SensorUnit]:
     """Return the units that stand as links in a file, each on itself or the nearest link that has a capsule."""
-    rows = []
+    units = []
     for name in names:
         at, T, mounts = robot.index(name), np.eye(4), list[tuple[str, FloatArray]]()
         while True:
@@ -106,30 +96,31 @@ def rows_of_links(robot: RobotTree, model: RobotModel, names: list[str], sensor:
             )
         solid = [one for one in mounts if seat(model, model.link_index(one[0]), one[1][:3, 3])]
         link, T = (solid or mounts[::-1])[0]
-        rows.append(Row(name, link, sensor, T))
-    return rows
+        units.append(SensorUnit(name, link, T, sensor=sensor))
+    return units
 
 
-def rows_of_table(file: Path, model: RobotModel, sensor: str) -> list[Row]:
+def units_of_table(file: Path, model: RobotModel, sensor: Sensor) -> list[SensorUnit]:
     """Return the units of a CSV or YAML file of poses; a fault is a SkinError that names the unit."""
-    rows = []
+    units = []
     try:
         for place, entry in _csv(file) if file.suffix.lower() in (".csv", ".tsv", ".txt") else _yaml(file):
             texts = {ours: next((entry[k] for k in theirs if entry.get(k)), "") for ours, theirs in _TEXTS.items()}
             link = texts["link"] or next((word for word in place.split("/") if word in model.links), "")
             if not link:
                 raise SkinError(f"{file}: {place} names no link: add link, one of {', '.join(model.links[1:])}.")
+            kind = sensor_called(texts["sensor"], f"{file}: {place}", {}) if texts["sensor"] else sensor
             name = str(texts["id"] or place.rpartition("/")[2].replace(" ", "_"))
-            rows.append(Row(name, str(link), str(texts["sensor"] or sensor), _pose(entry, f"{file}: {place}")))
+            units.append(SensorUnit(name, str(link), _pose(entry, f"{file}: {place}"), sensor=kind))
     except (OSError, UnicodeDecodeError, YAMLError) as error:
         reason = " ".join(str(error).split())
         raise SkinError(f"{file} cannot be read: {reason}: give a URDF, or a CSV or YAML file of poses.") from error
-    if not rows:
+    if not units:
         raise SkinError(
             f"{file} holds no poses: give each unit id, link, x, y, z and qw, qx, qy, qz, or roll, pitch, yaw, or the"
             " beam as nx, ny, nz; units that stand as links of a URDF are imported from that, by --links PATTERN."
         )
-    return rows
+    return units
 
 
 def _csv(file: Path) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -150,60 +141,63 @@ def _yaml(file: Path) -> Iterator[tuple[str, dict[str, Any]]]:
 
     def walk(node: Any, place: str) -> Iterator[tuple[str, dict[str, Any]]]:
         entry = dict(_flat(node, "")) if isinstance(node, dict) else {}
-        if any(re.fullmatch(_NUMBERS["p"], _split(key)[0]) for key in entry):
+        if any(_part(key)[0] == "position" for key in entry):
             yield place, entry
-        else:
-            items = node.items() if isinstance(node, dict) else enumerate(node, 1) if isinstance(node, list) else ()
-            for key, value in items:
+        elif isinstance(node, dict | list):
+            for key, value in node.items() if isinstance(node, dict) else enumerate(node, 1):
                 yield from walk(value, f"{place}/{key}" if isinstance(node, dict) else f"{place} {key}")
 
     yield from walk(YAML(typ="safe").load(file), file.stem)
 
 
 def _flat(node: dict[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
-    """Yield keys and values of a mapping; those of poses in it, and the numbers of lists, have keys of their own."""
+    """Yield keys and values of a mapping; those of its pose, and the numbers of lists, have keys of their own."""
     for key, value in node.items():
         name = f"{prefix}{key}".lower()
-        if isinstance(value, dict | list) and not _OF_POSES.match(name):
-            continue
-        if isinstance(value, dict):
+        words = name.split("_")
+        unit = f"_{words.pop()}" if words[-1] in _SCALES else ""
+        if isinstance(value, dict) and any(words[-1] in names for names in _KINDS.values()):
             yield from _flat(value, f"{name}_")
         elif isinstance(value, list):
-            stem, unit = _split(name)
-            parts = next((parts for end, parts in _LISTS.items() if stem.endswith(end)), "xyz")
-            if len(value) != len(parts):
-                raise SkinError(
-                    f"{name} has {len(value)} numbers: name a quaternion quaternion_wxyz or quaternion_xyzw."
-                )
-            stem = re.sub(r"_?(wxyz|xyzw)$", "", stem)
-            yield from ((f"{stem}_{part}{unit and '_'}{unit}", v) for part, v in zip(parts, value, strict=True))
-        else:
+            parts = _LISTS.get(words[-1], "xyz")
+            if any(words[-1] in kinds for kinds in (*_KINDS.values(), _LISTS)):
+                if len(value) != len(parts):
+                    way_out = "name a quaternion quaternion_wxyz or quaternion_xyzw"
+                    raise SkinError(f"{name} has {len(value)} numbers, not {len(parts)}: {way_out}.")
+                yield from ((f"{'_'.join(words)}_{part}{unit}", v) for part, v in zip(parts, value, strict=True))
+        elif not isinstance(value, dict):
             yield name, value
 
 
-def _split(key: str) -> tuple[str, str]:
-    """Return a key without its unit, and the unit or ''."""
-    match = _UNIT.fullmatch(key)
-    return (match[1], match[2] or "") if match else (key, "")
+def _part(key: str) -> tuple[str, str, str]:
+    """Return the kind of number that a key has, of `_PARTS`, which part of it, and its unit; '' for what it has not."""
+    words = key.split("_")
+    unit = words.pop() if len(words) > 1 and words[-1] in _SCALES else ""
+    *others, part = words
+    if part in _PARTS["angles"]:
+        return "angles", part, unit
+    before, axis = (others[-1], part) if others and len(part) == 1 else (part[:-1], part[-1:])
+    kinds = (kind for kind, names in _KINDS.items() if before in names and axis in [*_PARTS[kind]])
+    return next(kinds, ""), axis, unit
 
 
 def _pose(entry: dict[str, Any], where: str) -> FloatArray:
     """Return the pose (4, 4) of an entry, whose keys may end in units; z looks along a beam that is given alone."""
     values: dict[tuple[str, str], float] = {}
     for key, value in entry.items():
-        stem, unit = _split(key)
-        matches = [(kind, m[1]) for kind, pattern in _NUMBERS.items() if (m := re.fullmatch(pattern, stem))]
-        if not matches or value in ("", None):
+        kind, part, unit = _part(key)
+        if not kind or value in ("", None):
             continue
         try:
-            values[matches[0]] = number = float(value) * _SCALES[unit or "m"]
+            values[kind, part] = float(value) * _SCALES[unit or "m"]
         except (TypeError, ValueError):
             raise SkinError(f"{where}: {key} is {value!r}: give a number, with a decimal point.") from None
-        if matches[0][0] == "a" and not unit and abs(number) > _TURN:
+        if kind == "angles" and not unit and abs(values[kind, part]) > _TURN:
             raise SkinError(f"{where}: {key} is {value!r}: give radians, or name it {key}_deg.")
     parts = {kind: [values.get((kind, part), np.nan) for part in names] for kind, names in _PARTS.items()}
-    turn = next((kind for kind in "qan" if np.isfinite(parts[kind]).all() and (any(parts[kind]) or kind == "a")), "")
-    if not np.isfinite(parts["p"]).all() or not turn:
+    full = [kind for kind, numbers in parts.items() if np.isfinite(numbers).all()]
+    turn = next((kind for kind in full if kind == "angles" or (kind != "position" and any(parts[kind]))), "")
+    if "position" not in full or not turn:
         raise SkinError(
             f"{where} has no complete pose: give x, y, z and qw, qx, qy, qz, or roll, pitch, yaw, or the beam as nx,"
             f" ny, nz, not all zero; it has {', '.join(entry)}."
@@ -211,30 +205,28 @@ def _pose(entry: dict[str, Any], where: str) -> FloatArray:
     from scipy.spatial.transform import Rotation  # takes a fifth of a second to load
 
     T, numbers = np.eye(4), np.array(parts[turn])
-    if turn == "n":
+    if turn == "beam":
         rotation = Rotation.align_vectors(numbers[None], [[0.0, 0.0, 1.0]])[0]
+    elif turn == "quaternion":
+        rotation = Rotation.from_quat(numbers, scalar_first=True)
     else:
-        rotation = (
-            Rotation.from_quat(numbers, scalar_first=True) if turn == "q" else Rotation.from_euler("xyz", numbers)
-        )
-    T[:3, :3], T[:3, 3] = rotation.as_matrix(), parts["p"]
+        rotation = Rotation.from_euler("xyz", numbers)
+    T[:3, :3], T[:3, 3] = rotation.as_matrix(), parts["position"]
     return T
 
 
-def mounted(row: Row, model: RobotModel, beam: str) -> ImportedUnit:
-    """Return a unit whose frame has the beam along an axis of `BEAMS`, raised out of its link's capsules.
+def mounted(unit: SensorUnit, model: RobotModel, beam: Beam) -> ImportedUnit:
+    """Return a unit whose frame has the beam along an axis with the pose of ours, raised out of its link's capsules.
 
     To the side, the y axis of our frame points down, as in the optical frames of ROS. A unit deeper than `_RAISED_M`
     is left where it is, which a `Skin` refuses.
     """
-    T = row.T.copy()
-    z = np.eye(3)["xyz".index(beam[-1])] * (-1.0 if beam.startswith("-") else 1.0)
+    T, z = unit.T_link_sensor.copy(), np.eye(3)["xyz".index(beam[-1])] * (-1.0 if beam[0] == "-" else 1.0)
     y = np.array([0.0, 0.0, -1.0]) if z[2] == 0 else np.array([0.0, z[2], 0.0])
     T[:3, :3] = T[:3, :3] @ np.column_stack([np.cross(y, z), y, z])
-    below, raised, outward = seat(model, model.link_index(row.link), T[:3, 3]), 0.0, np.nan
+    below, raised, outward = seat(model, model.link_index(unit.link), T[:3, 3]), 0.0, np.nan
     if below:
         normal = below.normal if below.normal.any() else T[:3, 2]
         raised, outward = -below.height if -_RAISED_M < below.height < 0 else 0.0, float(T[:3, 2] @ normal)
         T[:3, 3] += (1 + 1e-6) * raised * normal
-    sensor = sensor_called(row.sensor, f"Unit {row.id}", {})
-    return ImportedUnit(SensorUnit(row.id, row.link, T, sensor=sensor), raised, outward)
+    return ImportedUnit(replace(unit, T_link_sensor=T), raised, outward)
