@@ -26,6 +26,8 @@ from pretouch.text_table import TextTable, tabulated
 
 _NEGLIGIBLE = 0.001
 """Least distance outside of the capsules that is mentioned [m]."""
+_INWARD = -0.02
+"""Cosine of the angle from the outward normal below which a unit looks into the arm."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,7 +164,6 @@ def _imported_skin(command: ImportSkin, model: RobotModel) -> dict[str, Any]:
     columns = (
         ("unit", lambda one: one.unit.id),
         ("link", lambda one: one.unit.link),
-        ("sensor", lambda one: one.unit.sensor.label),
         ("position\n[m]", lambda one: _vector(one.unit.T_link_sensor[:3, 3], 3)),
         ("looks along,\nin the link", lambda one: _vector(one.unit.T_link_sensor[:3, 2], 2)),
         (
@@ -172,15 +173,15 @@ def _imported_skin(command: ImportSkin, model: RobotModel) -> dict[str, Any]:
         ("off normal\n[deg]", lambda one: f"{np.rad2deg(np.arccos(np.clip(one.outward, -1, 1))):.0f}"),
     )
     note = "In the base: in the ready posture. Off normal: angle from the outward normal of the link's capsule."
-    if inward := [one.unit.id for one in units if one.outward <= 0]:
-        outward = {beam: sum(mounted(row, model, beam).outward > 0 for row in rows) for beam in get_args(Beam)}
-        best = max(outward, key=lambda beam: outward[beam])
+    if inward := [one.unit.id for one in units if one.outward < _INWARD]:
+        outward = {beam: sum(mounted(row, model, beam).outward > 0.5 for row in rows) for beam in get_args(Beam)}
+        best = max(outward, key=lambda beam: (outward[beam], beam == command.beam))
         other = f" With --beam={best}, {outward[best]} of {len(rows)} look outwards." if best != command.beam else ""
         sentences.append(f"Look into the arm: {', '.join(inward)}.{other}")
     if raised := [f"{one.unit.id} by {1000 * one.raised:.1f} mm" for one in units if one.raised]:
         sentences.append(f"Raised to the surface of the capsules, which stand over the arm's: {', '.join(raised)}.")
     console = Console(highlight=False)
-    show(console, [tabulated(f"{len(units)} units on {model.description.name}", columns, units, note, 3)])
+    show(console, [tabulated(f"{len(units)} units on {model.description.name}", columns, units, note)])
     for sentence in sentences:
         console.print(f"- {sentence}", markup=False, soft_wrap=True)
     save_skin(Skin([one.unit for one in units], model), command.out)

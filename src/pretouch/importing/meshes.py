@@ -27,7 +27,6 @@ _OTHER = {
     b"": "is empty",
     b"version https://git-lfs": "is a pointer of Git LFS: get the file itself by `git lfs pull`",
     b"<!doctype html": "is a web page: download the file itself",
-    b"<html": "is a web page: download the file itself",
     b"pk\x03\x04": "is a ZIP archive: unpack it",
     b"\x1f\x8b": "is compressed: unpack it by gunzip",
 }
@@ -73,7 +72,7 @@ class MeshFiles:
                     return place
         like = {place: _alike(parts, other) for other, place in self._below.get(Path(name).stem.lower(), [])}
         best = [place for place, alike in like.items() if alike >= count]
-        if len({place.read_bytes() for place in best}) == 1:  # a workspace has copies
+        if len(best) == 1 or len({place.read_bytes() for place in best}) == 1:  # a workspace has copies
             remark = f"Meshes are not where the file says: those of the same names in {best[0].parent} are taken."
             self._remarks += [] if remark in self._remarks else [remark]
             return best[0]
