@@ -57,7 +57,7 @@ def test_meshes_are_found_by_package_and_by_path(tmp_path, uri, place):
 @pytest.mark.parametrize(
     ("uri", "place"),
     [
-        ("package://my_arm/meshes/link3.stl", "ws/src/my_arm/meshes/Link3.STL"),
+        ("Package://my_arm//meshes/link3.stl", "ws/src/my_arm/meshes/Link3.STL"),
         ("package://My_Arm/meshes/a.stl", "ws/install/my_arm/share/my_arm/meshes/a.stl"),
         ("file:///home/user/ws/install/my_arm/share/my_arm/meshes/a.stl", "stack/my_arm/meshes/a.stl"),
         ("/opt/ros/humble/share/my_arm/meshes/deep/visual/a.stl", "my_arm/meshes/deep/visual/a.stl"),
@@ -117,6 +117,8 @@ def test_of_two_meshes_that_differ_none_is_taken_and_copies_are_one(tmp_path):
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", "is damaged: its faces do not count"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 9 9 9\n", "from 1 onwards: save it anew"),
         ("a.dae", b"<COLLADA", "is damaged|extra 'meshes'"),
+        ("a.dae", b"<a>\n<float_array>0.1 0,2</float_array></a>", "a decimal comma in line 2|extra 'meshes'"),
+        ("a.stl", BINARY[:80] + bytes(4) + BINARY[84:], "says that it has no triangle, but is longer"),
         ("a.passwd", b"root:x", "has an unknown format: use .stl, .obj, .dae"),
     ],
 )

@@ -46,8 +46,8 @@ def test_position_limits_that_mean_none_are_none(tmp_path, ends):
 def test_speeds_and_torques_that_mean_none_are_none_and_options_count(tmp_path, none):
     text = limited(f'lower="-2" upper="2" velocity="{none}" effort="{none}"')
     limits, remarks = imported(tmp_path, text)
-    assert "no velocity limit of all joints: 1 rad/s" in remarks
-    assert "no torque limit of all joints: 50 Nm" in remarks
+    assert "no usable velocity limit of all joints: 1 rad/s" in remarks
+    assert "no usable torque limit of all joints: 50 Nm" in remarks
     assert limits.qd_max.tolist() == [1.0] * 6
     limits, remarks = imported(tmp_path, text, qd_max=(2.0,), tau_max=(80.0,))
     assert "velocity" not in remarks
@@ -59,6 +59,7 @@ def test_speeds_and_torques_that_mean_none_are_none_and_options_count(tmp_path, 
     [
         (f'lower="-170" upper="170" {BEST}', "position", "joint1 (170 rad)"),
         (f'lower="-20" upper="65" {BEST}', "position", "joint1 (65 rad)"),
+        ('lower="-170" upper="170" velocity="25" effort="80"', "velocity", "joint1 (25 rad/s)"),
         ('lower="-2" upper="2" velocity="110" effort="80"', "velocity", "joint1 (110 rad/s)"),
         ('lower="-2" upper="2" velocity="-35" effort="80"', "velocity", "joint1 (35 rad/s)"),
     ],
@@ -86,6 +87,8 @@ def test_a_single_limit_and_torques_that_no_joint_has_are_of_another_unit(tmp_pa
 def test_radians_that_were_taken_for_degrees_are_named(tmp_path, end):
     text = mjcf().replace('range="-160 160"', f'range="-{end} {end}"')
     assert '<compiler angle="radian"/> says what they are' in imported(tmp_path, text, "arm.xml")[1]
+    some = text.replace(f'range="-{end} {end}"', 'limited="false"', 1)
+    assert "taken for degrees" in imported(tmp_path, some, "arm.xml")[1]
     assert "degrees" not in imported(tmp_path, mjcf(), "arm.xml")[1]
 
 

@@ -172,24 +172,27 @@ def limits_of(
             raise RobotModelError(f"{option} is {listed}: give one positive number [{unit}], or {n}, by commas.")
         if options:
             return np.broadcast_to(np.array(options, dtype=np.float64), n).copy()
-        values = _possible(arm, what, unit, _LARGEST[what], in_file)
+        largest = _ENDLESS if what == "velocity" and degrees else _LARGEST[what]
+        values = _possible(arm, what, unit, largest, in_file)
         if missing := [joint.name for joint, value in zip(arm.joints, values, strict=True) if value is None]:
             remarks.append(
-                f"The file has no {what} limit of {among(missing)}: {usual:g} {unit} is assumed; give {option}."
+                f"The file has no usable {what} limit of {among(missing)}: {usual:g} {unit} is assumed; give {option}."
             )
         return np.array([usual if value is None else value for value in values])
 
     ends = [max(map(abs, joint.limits)) if joint.limits else None for joint in arm.joints]
     usable = _possible(arm, "position", "rad", _LARGEST["position"], ends)
+    degrees = ends.count(None) + 1 < usable.count(None)  # then speeds are too, slow ones included
     if endless := [joint.name for joint, end in zip(arm.joints, usable, strict=True) if end is None]:
         remarks.append(
             f"The file has no usable position limits of {among(endless)}: -2 pi to 2 pi is assumed; give each a lower"
             " and an upper one there, or correct the range in arm.xml."
         )
-    elif max(filter(None, usable)) < np.deg2rad(_LARGEST["position"]):
+    within = [end for end in usable if end is not None]
+    if len(within) > 1 and max(within) < np.deg2rad(_LARGEST["position"]):
         remarks.append(
-            f"All joints have position limits within {max(filter(None, usable)):.2g} rad: perhaps they are radians that"
-            ' were taken for degrees. In an MJCF file, <compiler angle="radian"/> says what they are.'
+            f"All position limits are within {max(within):.2g} rad: perhaps they are radians that were taken for"
+            ' degrees. In an MJCF file, <compiler angle="radian"/> says what they are.'
         )
     ranges = np.array(
         [

@@ -31,7 +31,7 @@ _OTHER = {
     b"\x1f\x8b": "is compressed: unpack it by gunzip",
 }
 """Beginnings of files that people take for meshes."""
-_COMMA = re.compile(rb"^[ \t]*v(?:ertex)?[ \t][^\n]*\d,\d[^\n]*", re.M | re.I)
+_COMMA = re.compile(rb"^[ \t]*v(?:ertex)?[ \t][^\n]*\d,\d[^\n]*|<float_array[^>]*>[^<]*?\d,\d", re.M | re.I)
 
 
 class MeshFiles:
@@ -53,6 +53,7 @@ class MeshFiles:
     def find(self, uri: str) -> Path:
         """Return the file of a mesh, and note if it is elsewhere than its name says."""
         scheme, _, name = unquote(uri).replace("\\", "/").rpartition("://")
+        scheme = scheme.lower()
         near, package = self._near, ""
         places = [near / (name.removeprefix("localhost") if scheme == "file" else name)]
         parts = [part.lower() for part in places[0].parts if part != ".."]
@@ -164,7 +165,7 @@ def _check_kind(data: bytes) -> None:
         if data.lstrip().lower().startswith(beginning) if beginning else not data:
             raise RobotModelError(sentence)
     if b"\0" not in data and (comma := _COMMA.search(data)):
-        number, line = data.count(b"\n", 0, comma.start()) + 1, comma[0].decode(errors="replace").strip()
+        number, line = data.count(b"\n", 0, comma.end()) + 1, comma[0].decode(errors="replace").strip()[-60:]
         raise RobotModelError(f"has a decimal comma in line {number}, {line!r}: save it with decimal points")
 
 
@@ -182,6 +183,8 @@ def _whole_stl(data: bytes, path: Path, remarks: list[str]) -> bytes:
     if len(data) < end:
         whole = max(0, len(data) - 84) // 50
         raise RobotModelError(f"is cut: it holds {whole} of its {count} triangles: give a complete file")
+    if count == 0 and len(data) > end + 50:
+        raise RobotModelError("says that it has no triangle, but is longer than that: save it anew by another program")
     if len(data) > end:
         remarks.append(f"The {len(data) - end} bytes after the last triangle of {path} are left out.")
     return data[:end]
