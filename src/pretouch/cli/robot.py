@@ -10,7 +10,7 @@ import numpy as np
 import tyro
 from rich.console import Console
 
-from pretouch.cli.options import JsonFile, OptionalFile
+from pretouch.cli.options import JsonFile, OptionalFile, Paths, Words
 from pretouch.cli.tables import show
 from pretouch.cli.writing import check_outputs, numbers_to
 from pretouch.importing.capsules import LinkBody
