@@ -71,7 +71,6 @@ def test_its_units_are_heard_in_real_time(tmp_path, fr3_model):
         (["--units", "7337"], "give address and port"),
         (["--units", "127.0.0.1:7337"], "needs --keys"),
         (["--hand", "--scene", "static"], "--hand needs --scene empty"),
-        (["--scene", "nonesuch"], "--scene is nonesuch: give empty, static, dynamic, or an MJCF file"),
         (
             ["--start", "-0.1,0"],
             "--start is '-0.1,0': give ready, path, or 7 joint angles between commas",

@@ -72,17 +72,9 @@ def test_pushes_come_when_they_are_wanted_and_all_is_the_same_each_time(franka_s
     assert [state.tobytes() for state in states[:2]] == [state.tobytes() for state in states[2:]]
 
 
-_IN_A_ROOM = """<mujoco><worldbody><site name="base" pos="1 2 .7"/>
-<geom type="box" size=".3 .05 .3" pos="1.35 2.3 1.2"/></worldbody></mujoco>"""
-"""The box below, seen from a corner of the room."""
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("given", ["box", "scene"])
-def test_a_box_is_run_into_and_the_server_says_why_the_motion_ended(franka_server, connected, tmp_path, given):
-    (tmp_path / "world.xml").write_text(_IN_A_ROOM)
-    options = {"box": ("0.35,0.3,0.5:0.6,0.1,0.6",), "scene": tmp_path / "world.xml"}
-    server = franka_server(robot="fr3", **{given: options[given]})
+def test_a_box_is_run_into_and_the_server_says_why_the_motion_ended(franka_server, connected):
+    server = franka_server(robot="fr3", box=("0.35,0.3,0.5:0.6,0.1,0.6",))
     state = _motion(connected(server, "fr3"), 4.0, [0.4, 0, 0, 0, 0, 0, 0])
     assert state["robot_mode"] == _REFLEX
     assert state["reflex_reason"][ERRORS.index("cartesian_reflex")]

@@ -42,9 +42,8 @@ class ServeFci(FciOptions):
 
     robot: Literal["panda", "fr3"] = "panda"
     """The robot: panda speaks protocol 5 (libfranka 0.9), fr3 protocol 10 (libfranka 0.18 and later)."""
-    scene: str = "empty"
-    """Surroundings: empty, static (that experiment's board), dynamic (that experiment's person), or an MJCF file with a
-    world of your own, in which the arm stands at the site `base`, or else at the origin."""
+    scene: Literal["empty", "static", "dynamic"] = "empty"
+    """Surroundings: empty, static (that experiment's board), or dynamic (that experiment's person)."""
     trajectory: Literal["circle", "line"] = "circle"
     """Path of the static experiment, beside which its board stands."""
     side: Literal["+y", "-y"] = "+y"
@@ -133,10 +132,6 @@ def _scene(c: ServeFci, model: RobotModel) -> tuple[SceneSpec, HandScript | None
         case "dynamic":
             return SceneSpec(hand=HandSpec()), Pusher(model, dynamic_pushes(c.seed)), Circle()
     path, boxes = static_path(c.trajectory, c.side), tuple(_box(text, c.stiffness) for text in c.box)
-    if c.scene != "empty":
-        if not Path(c.scene).is_file():
-            raise ParameterError(f"--scene is {c.scene}: give empty, static, dynamic, or an MJCF file.")
-        return SceneSpec(world=Path(c.scene)), None, path
     if c.hand:
         return SceneSpec(boxes, HandSpec(start=VisitingHand.away)), VisitingHand(model.ee), path
     return SceneSpec(boxes), None, path

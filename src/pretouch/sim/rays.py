@@ -12,10 +12,9 @@ import numpy as np
 
 from pretouch.compiled import compiled, entry, kernel
 from pretouch.sim.flaws import ARRIVAL, NEXT, PART, PART_S, STAMP, FlawArrays, begin_frame, flawed, limits_of
-from pretouch.sim.mujoco_calls import mj_rayHfield, mj_rayMesh, mju_rayGeom
+from pretouch.sim.mujoco_calls import mju_rayGeom
 from pretouch.types import BoolArray, FloatArray, IntArray, RangeStatus
 
-_MESH, _HFIELD = int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_HFIELD)
 _MARGIN_M2 = 1e-9
 """Rounding must not make a ray miss what it touches [m^2]."""
 
@@ -24,14 +23,12 @@ class Geoms(NamedTuple):
     """The visible geoms (G,) of a scene, in MuJoCo's memory."""
 
     visible: IntArray  # (V,) those that are visible
-    kind: IntArray  # (G,) plane, sphere, capsule, box, mesh and so on
+    kind: IntArray  # (G,) plane, sphere, capsule or box
     body: IntArray  # (G,)
     size: FloatArray  # (G, 3)
     reach: FloatArray  # (G,) radius of a ball round each [m]; 0 of a plane, which has none
     position: FloatArray  # (G, 3) centres [m], base frame
     rotation: FloatArray  # (G, 9) rows of the rotation matrices
-    model: int  # address of the simulation's model
-    data: int  # address of its data
 
 
 def geoms_of(model: mujoco.MjModel, data: mujoco.MjData) -> Geoms:
@@ -41,7 +38,7 @@ def geoms_of(model: mujoco.MjModel, data: mujoco.MjData) -> Geoms:
     if not own.all():
         alpha[~own] = model.mat_rgba[model.geom_matid[~own], 3]
     shapes = np.flatnonzero(alpha), model.geom_type, model.geom_bodyid, model.geom_size, model.geom_rbound
-    return Geoms(*shapes, data.geom_xpos, data.geom_xmat, model._address, data._address)
+    return Geoms(*shapes, data.geom_xpos, data.geom_xmat)
 
 
 @kernel
@@ -74,14 +71,10 @@ def turned(R: FloatArray, cone: FloatArray) -> FloatArray:
 @kernel
 def _along(geoms: Geoms, geom: int, origin: FloatArray, ray: FloatArray, normal: FloatArray) -> float:
     """Return the distance [m] at which a ray meets a geom, -1 if it does not; into `normal` (3,) comes that there."""
-    kind = geoms.kind[geom]
     start, along, there = origin.ctypes.data, ray.ctypes.data, normal.ctypes.data
-    if kind == _MESH:
-        return mj_rayMesh(geoms.model, geoms.data, geom, start, along, there)
-    if kind == _HFIELD:
-        return mj_rayHfield(geoms.model, geoms.data, geom, start, along, there)
     position, rotation, size = geoms.position[geom], geoms.rotation[geom], geoms.size[geom]
-    return mju_rayGeom(position.ctypes.data, rotation.ctypes.data, size.ctypes.data, start, along, kind, there)
+    place, turn, shape = position.ctypes.data, rotation.ctypes.data, size.ctypes.data
+    return mju_rayGeom(place, turn, shape, start, along, geoms.kind[geom], there)
 
 
 @kernel

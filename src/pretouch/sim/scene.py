@@ -1,7 +1,6 @@
 """Simulated room: the arm on its pedestal, a floor, static objects and a hand."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -9,7 +8,6 @@ import numpy as np
 from pretouch.perception.scene_filter import Fixtures, floor_and_pedestal
 from pretouch.robot.model import RobotModel
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.world_file import attach_world
 from pretouch.types import FloatArray
 
 CONTACTS = "contacts"
@@ -68,8 +66,6 @@ class SceneSpec:
     """[m]"""
     damping_ratio: float = 0.1
     """Damping of a contact as a fraction of critical for 2 kg."""
-    world: Path | None = None
-    """MJCF file of what is there in place of floor and pedestal; no recording draws that again."""
 
 
 def described(spec: SceneSpec) -> dict[str, object]:
@@ -103,20 +99,16 @@ class ArmError:
 
 
 def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel:
-    """Build the MuJoCo model of a scene. Only declared pairs touch, and what a world's file lets touch.
+    """Build the MuJoCo model of a scene. Only declared pairs touch.
 
-    Each moving capsule touches floor, boxes and hand; the hand also touches all that stands still, but in a world.
+    Each moving capsule touches floor, boxes and hand; the hand also touches all that stands still.
     """
     mj, moving, still = _arm(model, error)
     mj.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    if spec.world:  # behind the arm, whose joints are found by their numbers
-        attach_world(mj, spec.world)
-    else:
-        still.append("pedestal")
     stiffness = _add_objects(mj, spec)
     pairs = [(link, thing) for link in moving for thing in stiffness]
     if spec.hand:
-        pairs += [(thing, "hand") for thing in [*still, *stiffness] if thing != "hand"]
+        pairs += [(thing, "hand") for thing in [*still, "pedestal", *stiffness] if thing != "hand"]
     friction, impedance = [0.5, 0.5, 0.005, 0.0001, 0.0001], [_IMPEDANCE, _IMPEDANCE, 0.001, 0.5, 2.0]
     for one, other in pairs:
         mj.add_pair(geomname1=one, geomname2=other, condim=3, friction=friction, solimp=impedance)
@@ -172,12 +164,10 @@ def _add_objects(mj: mujoco.MjSpec, spec: SceneSpec) -> dict[str, float]:
     world = mj.worldbody
     off = {"contype": 0, "conaffinity": 0}
     kind = mujoco.mjtGeom
-    stiffness: dict[str, float] = {}
-    if not spec.world:
-        world.add_geom(name="floor", type=kind.mjGEOM_PLANE, size=[3, 3, 0.1], pos=[0, 0, spec.floor_height], **off)
-        axis, size = [0, 0, spec.floor_height, 0, 0, -spec.pedestal_radius], [spec.pedestal_radius, 0, 0]
-        world.add_geom(name="pedestal", type=kind.mjGEOM_CAPSULE, fromto=axis, size=size, **off)
-        stiffness["floor"] = 100_000.0
+    world.add_geom(name="floor", type=kind.mjGEOM_PLANE, size=[3, 3, 0.1], pos=[0, 0, spec.floor_height], **off)
+    axis, size = [0, 0, spec.floor_height, 0, 0, -spec.pedestal_radius], [spec.pedestal_radius, 0, 0]
+    world.add_geom(name="pedestal", type=kind.mjGEOM_CAPSULE, fromto=axis, size=size, **off)
+    stiffness = {"floor": 100_000.0}
     for thing in spec.boxes:
         world.add_geom(name=thing.name, type=kind.mjGEOM_BOX, size=thing.half_size, pos=thing.center, **off)
         stiffness[thing.name] = thing.stiffness
