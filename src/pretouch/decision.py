@@ -144,10 +144,8 @@ class Decision:
         p, memory, robot, state = self.profile, self.memory, self.robot, self.state
         reacting, before = self.mode.mode is Mode.REACT, memory.part("window", Window)
         window = add_force(before, p.detect.counted(robot, before), p.window)
-        doubted = self.load.doubted_kg if self.load else 0.0
-        sample = Sample(
-            self.stamp, self.kin, robot, window, before.full, self.near, reacting, self.watched, self.touches, doubted
-        )
+        kg, watched, touches = self.load.doubted_kg if self.load else 0.0, self.watched, self.touches
+        sample = Sample(self.stamp, self.kin, robot, window, before.full, self.near, reacting, watched, touches, kg)
         detection, detector = p.detect.step(self.controller.whole_detector(state), self.controller.body, sample)
         window = before if reacting and p.window.freeze_while_reacting else window
         memory.fill("window", window)
