@@ -15,7 +15,7 @@ from pretouch.sim.scene import Box, HandSpec, SceneSpec
 @pytest.fixture
 def plant(panda_model):
     boxes = Box("board", (0.5, 0.3, 0.4), (0.15, 0.02, 0.12), 1e5), Box("post", (-0.5, -0.5, 0.3), (0.1, 0.1, 0.3), 1e5)
-    scene = SceneSpec(boxes, HandSpec(start=(0.4, -0.4, 0.4)))
+    scene = SceneSpec(boxes, HandSpec(radius=0.1, start=(0.4, -0.2, 0.5)))
     return Plant(panda_model, scene, NO_ERROR, panda_model.description.q_ready.copy(), seed=0)
 
 
