@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch.errors import RecordingError
-from pretouch.imported_data.log import Choice, Log, check_reach, interpolated, joint_places
+from pretouch.imported_data.bags import interpolated
+from pretouch.imported_data.log import Choice, Log, check_reach, joint_places
 from pretouch.imported_data.reading import open_log, read_joints
 from tests.imported_data.files import PANDA
 

@@ -18,6 +18,7 @@ from pretouch.imported_data.reading import open_log
 from pretouch.imported_data.results import joint_motion
 from pretouch.imported_data.tables import renamed
 from pretouch.imported_data.torques import observed, torque_recording
+from pretouch.importing.mounting import weights_of
 from pretouch.profiles import profile
 from pretouch.types import Touched
 from tests.imported_data.files import write_csv
@@ -186,14 +187,14 @@ GAINS = np.array([10.0, 11.0, 9.0, 8.0, 5.0, 4.0, 3.0])
     ],
 )  # fmt: skip
 def test_torques_of_another_kind_are_refused_and_named(tmp_path, panda_model, short, change, choice, words):
-    weight = np.array([panda_model.weights(q) for q in short.q])
+    weight = np.array([weights_of(panda_model, q) for q in short.q])
     columns = short.columns(("q*_rad", short.q), ("dq*_rad_s", short.qd), ("tau*_Nm", change(short.driving, weight)))
     with pytest.raises(RecordingError, match=words):
         read_torques(write_csv(tmp_path / "a.csv", columns), Choice(**choice))
 
 
 def test_external_torques_of_an_arm_that_is_mounted_otherwise_than_it_thinks_are_refused(tmp_path, panda_model, short):
-    weight = np.array([panda_model.weights(q) for q in short.q])
+    weight = np.array([weights_of(panda_model, q) for q in short.q])
     file = external(short, tmp_path / "a.csv", short.tau_ext + weight @ [-9.81, 0.0, -9.81])
     with pytest.raises(RecordingError, match=r"external torques in .* gravity points along 1,0,0 in its base frame"):
         read_torques(file, Choice())

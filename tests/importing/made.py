@@ -5,10 +5,10 @@ from pathlib import Path
 from pretouch.coverage.measure import CoverageSetting
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import suggest
-from pretouch.perception.scene_filter import floor_and_pedestal
 from pretouch.robot.description import load_description
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import OWN_SKIN, Skin, save_skin
+from pretouch.sim.scene import floor_and_pedestal
 
 BOX = '<geometry><box size="0.08 0.08 0.2"/></geometry>'
 

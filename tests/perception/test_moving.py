@@ -6,11 +6,11 @@ from tests.perception.watcher import PARAMS, Watcher
 from tests.sim.ranging import FORWARD, ORIGIN
 
 from pretouch.perception.closest import beside, near_moving
-from pretouch.perception.scene_filter import floor_and_pedestal
 from pretouch.robot.body import placed
 from pretouch.robot.postures import segment_distance
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
+from pretouch.sim.scene import floor_and_pedestal
 from pretouch.sound import sound_moving
 from pretouch.types import MovingFixtures, RangeReadings
 

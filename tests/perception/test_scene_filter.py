@@ -12,11 +12,12 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 from tests.perception.watcher import FLOOR, HAND_LEFT, Watcher
 
+from pretouch.coverage.ways import expected_range
 from pretouch.errors import SkinError
 from pretouch.params import PerceptionParams
 from pretouch.perception.closest import closest_points
 from pretouch.perception.obstacles import placed_sensors
-from pretouch.perception.scene_filter import Fixtures, expected_range, no_fixtures, ray_capsule
+from pretouch.perception.scene_filter import Fixtures, no_fixtures, ray_capsule
 from pretouch.profiles import PROFILES
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import panda

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pretouch.arms.other_arm import OtherArm
-from pretouch.perception.scene_filter import floor_and_pedestal
 from pretouch.robot.body import placed
+from pretouch.sim.scene import floor_and_pedestal
 from pretouch.sound import sound_moving
 from pretouch.types import RobotState
 

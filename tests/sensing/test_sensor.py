@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from pretouch.coverage.ways import expected_range
 from pretouch.errors import ParameterError, SkinError
 from pretouch.perception.obstacles import measured, placed_sensors
-from pretouch.perception.scene_filter import Fixtures, expected_range
+from pretouch.perception.scene_filter import Fixtures
 from pretouch.robot.body import no_capsules
 from pretouch.sensing.sensor import PAPER_SENSOR, VL53L5CX, VL53L7CX, Sensor, cone_rays, cones_of
 from pretouch.sensing.skin import Skin, load_skin, save_skin, sensor_unit

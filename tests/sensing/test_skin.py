@@ -10,9 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from pretouch.coverage.ways import expected_range
 from pretouch.errors import SkinError
 from pretouch.perception.obstacles import placed_sensors
-from pretouch.perception.scene_filter import expected_range, no_fixtures
+from pretouch.perception.scene_filter import no_fixtures
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import brought_to

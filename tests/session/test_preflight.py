@@ -10,6 +10,7 @@ from pretouch.arms.franka.limits import LimiterParams
 from pretouch.control.path import Circle, segment
 from pretouch.controller import Controller
 from pretouch.errors import RobotError
+from pretouch.importing.mounting import weights_of
 from pretouch.loop import MonotonicClock
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.ports import NoUnits
@@ -56,7 +57,7 @@ def test_a_force_at_rest_that_would_hide_contacts_is_refused(controller, panda_m
 
 def test_torques_of_an_arm_that_is_mounted_otherwise_are_refused_and_named(controller, panda_model):
     standing = seen(PushedArm(panda_model))
-    weight = panda_model.weights(standing.newest.q) @ (panda_model.gravity - [9.81, 0.0, 0.0])
+    weight = weights_of(panda_model, standing.newest.q) @ (panda_model.gravity - [9.81, 0.0, 0.0])
     (finding,) = found(controller, replace(standing, tau_ext=standing.tau_ext + weight))
     assert (finding.what, finding.level) == ("mounting", "fault")
     assert re.search(r"gravity points along \(9\.8, -?0\.0, -?0\.0\) m/s\^2 in its base frame", finding.sentence)

@@ -18,11 +18,11 @@ from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import Suggestion, candidates, suggest
 from pretouch.coverage.ways import Ways, seen_by
 from pretouch.errors import ParameterError, SkinError
-from pretouch.perception.scene_filter import floor_and_pedestal
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import sensor_called
 from pretouch.sensing.skin import Skin, load_skin, save_skin, skin_file
+from pretouch.sim.scene import floor_and_pedestal
 from pretouch.text_table import TextTable, tabulated
 from pretouch.types import BoolArray
 

@@ -10,10 +10,9 @@ from itertools import count as count_from
 
 import numpy as np
 
-from pretouch.coverage.ways import Ways, seen_by
+from pretouch.coverage.ways import Ways, expected_range, seen_by
 from pretouch.errors import SkinError
 from pretouch.perception.obstacles import placed_sensors
-from pretouch.perception.scene_filter import expected_range
 from pretouch.robot.body import surface_of
 from pretouch.robot.kinematics import tangents_of
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor

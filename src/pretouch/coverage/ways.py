@@ -7,11 +7,11 @@ import numpy as np
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.sighting import BallWays, View, ways_free, ways_seen
 from pretouch.perception.obstacles import placed_sensors
-from pretouch.perception.scene_filter import Fixtures, expected_range
+from pretouch.perception.scene_filter import Fixtures, bounds, nearest_capsule, plane_return
 from pretouch.robot.body import Capsules, Surface, placed
 from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.sensor import Sensors
+from pretouch.sensing.sensor import Cones, Sensors
 from pretouch.sensing.skin import Skin
 from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray
 
@@ -149,3 +149,18 @@ def seen_by(ways: Ways, skin: Skin) -> BoolArray:
         ways_seen(ball, free[s], p.first, p.last, sensors, skin.cones, view, by_zone)
         visible[:, s] = np.logical_or.reduceat(by_zone, skin.first)
     return visible
+
+
+def expected_range(kin: Kinematics, sensors: Sensors, cones: Cones, body: Capsules, fixtures: Fixtures) -> FloatArray:
+    """Return the distance (K,) [m] at which each sensor would see the arm or a fixture, infinite without a return.
+
+    It is the least over rays that fill the placed sensor's cone. A unit does not see its own link. `body` is the arm
+    as capsules, base included.
+    """
+    near = np.array([plane_return(sensors, k, fixtures.planes, cones, np.inf) for k in range(len(sensors.link))])
+    for part in (body, fixtures.capsules):
+        capsules = placed(part, kin)
+        spheres = bounds(capsules)
+        for k in range(len(near)):
+            near[k] = min(near[k], nearest_capsule(sensors, k, capsules, spheres, cones))
+    return near

@@ -10,7 +10,7 @@ import numpy as np
 
 from pretouch.errors import RecordingError
 from pretouch.imported_data.bag_files import opened_bag
-from pretouch.imported_data.log import Choice, Log, Note, arm_of, goes_on, interpolated, joint_places, listed
+from pretouch.imported_data.log import Choice, Log, Note, arm_of, goes_on, joint_places, listed
 from pretouch.recording.ros import JOINT_STATE, READ_WITH, UNIT_SAMPLE, WRENCH
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, IntArray
@@ -251,6 +251,23 @@ def _joined(logs: Sequence[Log], gap_s: float) -> Log:
     at = {kind: interpolated(joints, kind, log.time, gap_s) for kind in ("q", "dq") if kind in joints.arrays}
     sources = log.sources | dict.fromkeys(at, joints.sources["q"])
     return replace(log, arrays=log.arrays | at, sources=sources, notes=(*log.notes, *joints.notes))
+
+
+def interpolated(log: Log, kind: str, ticks: IntArray, longest_s: float) -> FloatArray:
+    """Values (S, m) at each tick [ns], linear between samples that are at most so far apart [s], or else NaN.
+
+    The log is in order. The last value is held for as long; before the first there is none.
+    """
+    time, values = log.time, log.arrays[kind]
+    at = np.full((len(ticks), values.shape[1]), np.nan)
+    left = np.searchsorted(time, ticks, side="right") - 1
+    right = np.minimum(left + 1, len(time) - 1)
+    gap = np.where(left == right, ticks - time[left], time[right] - time[left])
+    inside = (left >= 0) & (gap <= 1e9 * longest_s)
+    i, j = left[inside], right[inside]
+    share = (ticks[inside] - time[i]) / np.maximum(gap[inside], 1)
+    at[inside] = values[i] + share[:, None] * (values[j] - values[i])
+    return at
 
 
 def _with_positions(log: Log) -> Log:

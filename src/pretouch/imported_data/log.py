@@ -331,23 +331,6 @@ def pieces(time: FloatArray, gap_s: float = GAP_S) -> list[slice]:
     return [slice(int(a), int(b)) for a, b in zip([0, *ends], [*ends, len(time)], strict=True)]
 
 
-def interpolated(log: Log, kind: str, ticks: IntArray, longest_s: float) -> FloatArray:
-    """Values (S, m) at each tick [ns], linear between samples that are at most so far apart [s], or else NaN.
-
-    The log is in order. The last value is held for as long; before the first there is none.
-    """
-    time, values = log.time, log.arrays[kind]
-    at = np.full((len(ticks), values.shape[1]), np.nan)
-    left = np.searchsorted(time, ticks, side="right") - 1
-    right = np.minimum(left + 1, len(time) - 1)
-    gap = np.where(left == right, ticks - time[left], time[right] - time[left])
-    inside = (left >= 0) & (gap <= 1e9 * longest_s)
-    i, j = left[inside], right[inside]
-    share = (ticks[inside] - time[i]) / np.maximum(gap[inside], 1)
-    at[inside] = values[i] + share[:, None] * (values[j] - values[i])
-    return at
-
-
 def listed(names: Sequence[str]) -> str:
     """Names, as a part of a sentence."""
     return ", ".join(repr(name) for name in names[:8]) + (", ..." if len(names) > 8 else "") or "none"

@@ -8,6 +8,7 @@ import scipy  # its parts load when they are first used: a quarter of a second t
 
 from pretouch.errors import RecordingError
 from pretouch.imported_data.log import TORQUES, Choice, ImportedRecording, Log, Note, check_reach, gaps, listed, pieces
+from pretouch.importing.mounting import lean_of, weights_of
 from pretouch.params import SequentialParams
 from pretouch.robot.description import STANDING
 from pretouch.robot.kinematics import G_M_S2
@@ -234,13 +235,13 @@ def _mounted(
     """
     q, speed, tau = map(_some, motion)
     loads = [choice.payload * model.ee_jacobian(model.kinematics(p))[:3].T for p in q]
-    weights = np.array([model.weights(p) for p in q]) - loads
+    weights = np.array([weights_of(model, p) for p in q]) - loads
     weight, external = weights @ model.gravity, "external " if kind == "tau_ext" else ""
     # an interface takes for external the torque of the gravity that it knows less that of the true one
     hold = weight - tau if external else tau - expected + weight
     same, whole, free = (float(_left(x, speed).sum()) for x in (hold - weight, tau, hold))
     gravity, size, left = _fitted(hold, weights, speed)
-    down, lean = _direction(gravity), model.lean(gravity)
+    down, lean = _direction(gravity), lean_of(model, gravity)
     if not external and same > _MOST * whole and size < _LIGHT and left > _MOST * free:
         raise RecordingError(
             f"The torques in {place} have no gravity in them, so they are external or commanded ones (tau_J_d): name"
@@ -253,7 +254,7 @@ def _mounted(
         explanations.append((left, along, f"{tell} --gravity {down}"))
     if not external:
         other, size, rest = _fitted(weight - tau - expected, weights, speed)
-        if rest < _FAR_BETTER * left and model.lean(other) < _LEAN_DEG:
+        if rest < _FAR_BETTER * left and lean_of(model, other) < _LEAN_DEG:
             return model, []  # of the other sign, and nothing else: `_check_signs` names it
         turned = f"minus those of an arm whose gravity points along {_direction(other)}"
         rest = rest if _LIGHT < size < _HEAVY else np.inf

@@ -7,8 +7,8 @@ import numpy as np
 from pretouch.compiled import compiled, inlined, kernel
 from pretouch.errors import FixtureError
 from pretouch.perception.obstacles import locate
-from pretouch.robot.body import Capsules, gap_to, no_capsules, placed, to_axis
-from pretouch.robot.kinematics import Kinematics, dot
+from pretouch.robot.body import Capsules, gap_to, no_capsules, to_axis
+from pretouch.robot.kinematics import dot
 from pretouch.sensing.sensor import Cones, Sensors
 from pretouch.types import BoolArray, FloatArray
 
@@ -45,35 +45,6 @@ class Fixtures:
 def no_fixtures() -> Fixtures:
     """Return fixtures without any body."""
     return Fixtures(np.zeros((0, 4)), no_capsules())
-
-
-def floor_and_pedestal(floor: float, radius: float = 0.1) -> Fixtures:
-    """Return a floor at a height [m], base frame, and a pedestal of a radius [m] under the arm."""
-    return Fixtures(
-        planes=np.array([[0.0, 0.0, 1.0, floor]]),
-        capsules=Capsules(
-            link=np.zeros(1, np.int64),
-            a=np.array([[0.0, 0.0, floor]]),
-            # the rounded top ends at the origin, where the arm begins
-            b=np.array([[0.0, 0.0, -radius]]),
-            radius=np.array([radius]),
-        ),
-    )
-
-
-def expected_range(kin: Kinematics, sensors: Sensors, cones: Cones, body: Capsules, fixtures: Fixtures) -> FloatArray:
-    """Return the distance (K,) [m] at which each sensor would see the arm or a fixture, infinite without a return.
-
-    It is the least over rays that fill the placed sensor's cone. A unit does not see its own link. `body` is the arm
-    as capsules, base included.
-    """
-    near = np.array([plane_return(sensors, k, fixtures.planes, cones, np.inf) for k in range(len(sensors.link))])
-    for part in (body, fixtures.capsules):
-        capsules = placed(part, kin)
-        spheres = bounds(capsules)
-        for k in range(len(near)):
-            near[k] = min(near[k], nearest_capsule(sensors, k, capsules, spheres, cones))
-    return near
 
 
 @compiled

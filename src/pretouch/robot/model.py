@@ -161,20 +161,6 @@ class RobotModel:
         mass_matrix_into(self.kinematics(q), self.mechanism, mass_matrix)
         return mass_matrix
 
-    def lean(self, gravity: FloatArray) -> float:
-        """Return the angle between its gravity and another one (3,) [degrees]."""
-        along = gravity @ self.gravity / (np.linalg.norm(gravity) * G_M_S2)
-        return float(np.rad2deg(np.arccos(np.clip(along, -1.0, 1.0))))
-
-    def weights(self, q: FloatArray) -> FloatArray:
-        """Compute the torques (n, 3) that hold the arm at q (n,) [rad], by gravity along each base axis [kg m]."""
-        kin, links = self.kinematics(q), self.mechanism.links
-        center = kin.position + np.einsum("kij,kj->ki", kin.rotation, links.com)
-        mass = links.mass[:, None] * self.moved_by
-        # sum of m_k (c_k - p_j) over the links that joint j moves
-        lever = mass.T @ center - mass.sum(axis=0)[:, None] * kin.anchor
-        return np.cross(lever, kin.axis)
-
     def mass_matrix_and_bias(self, q: FloatArray, qd: FloatArray, bias: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Compute the mass matrix (n, n) and, into `bias` (n,), Coriolis plus gravity torques [Nm]."""
         model, data = self._model, self._data

@@ -8,6 +8,7 @@ import numpy as np
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.controller import Controller
 from pretouch.errors import RobotError
+from pretouch.importing.mounting import lean_of, weights_of
 from pretouch.ports import Arm, Clock, Robot, SkinPort
 from pretouch.sound import sound_robot
 from pretouch.types import FloatArray, RobotState
@@ -247,12 +248,12 @@ def _torques(controller: Controller, rest: Standstill) -> Iterator[Finding]:
 
 def _mounting(controller: Controller, rest: Standstill) -> Iterator[Finding]:
     model, torque = controller.model, rest.rest_torque
-    weights = model.weights(rest.newest.q)
+    weights = weights_of(model, rest.newest.q)
     # a robot takes for external the torque of the gravity that it knows less that of the true one
     error = np.linalg.lstsq(weights, np.nan_to_num(torque))[0]
     gravity, left = model.gravity - error, np.linalg.norm(torque - weights @ error)
     size = np.linalg.norm(gravity) / np.linalg.norm(model.gravity)
-    if model.lean(gravity) > MOUNTING_DEG and 0.7 < size < 1.3 and left < MOUNTING_SHARE * np.linalg.norm(torque):
+    if lean_of(model, gravity) > MOUNTING_DEG and 0.7 < size < 1.3 and left < MOUNTING_SHARE * np.linalg.norm(torque):
         yield _fault(
             "mounting",
             f"At rest the robot's external torques are those of an arm whose gravity points along {vector(gravity)}"
@@ -337,6 +338,5 @@ class StandingArm:
 
     def demand_fit(self) -> None:
         """Raise a RobotError with all reasons of the arm itself against moving."""
-        against = self.arm.unfit()
-        if against:
+        if against := self.arm.unfit():
             raise RobotError(" ".join(against))

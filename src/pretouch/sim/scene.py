@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from pretouch.perception.scene_filter import Fixtures, floor_and_pedestal
+from pretouch.perception.scene_filter import Fixtures
+from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sim.plant_params import PlantParams
 from pretouch.types import FloatArray
@@ -75,6 +76,20 @@ def described(spec: SceneSpec) -> dict[str, object]:
         "hand_radius_m": spec.hand.radius if spec.hand else None,
         "floor_height_m": spec.floor_height,
     }
+
+
+def floor_and_pedestal(floor: float, radius: float = 0.1) -> Fixtures:
+    """Return a floor at a height [m], base frame, and a pedestal of a radius [m] under the arm."""
+    return Fixtures(
+        planes=np.array([[0.0, 0.0, 1.0, floor]]),
+        capsules=Capsules(
+            link=np.zeros(1, np.int64),
+            a=np.array([[0.0, 0.0, floor]]),
+            # the rounded top ends at the origin, where the arm begins
+            b=np.array([[0.0, 0.0, -radius]]),
+            radius=np.array([radius]),
+        ),
+    )
 
 
 def fixtures(spec: SceneSpec) -> Fixtures:

@@ -15,7 +15,6 @@ from pretouch.contact.sequential_test import SequentialTest
 from pretouch.control.path import Circle, Path, WayPoints
 from pretouch.controller import Controller
 from pretouch.errors import HardwareError, ParameterError
-from pretouch.perception.scene_filter import floor_and_pedestal
 from pretouch.ports import NoUnits, SkinPort
 from pretouch.profiles import Profile
 from pretouch.profiles import profile as find_profile
@@ -26,7 +25,7 @@ from pretouch.sensing.skin import Skin, skin_for
 from pretouch.session.memory import FreeMotion, ModelFile, model_file_of, state_folder
 from pretouch.session.terminal import say
 from pretouch.sim.paper_scenes import Placement, assumptions, placement_for
-from pretouch.sim.scene import SceneSpec
+from pretouch.sim.scene import SceneSpec, floor_and_pedestal
 from pretouch.types import FloatArray
 from pretouch.units.keys import load_keys
 from pretouch.units.skin import NetworkSkin
