@@ -81,9 +81,8 @@ def weighted_value(
     value = reading.copy()
     for i in range(len(value)):
         if abs(reading[i] - mean[i]) > p.lambda_ * std[i]:
-            value[i] = (
-                p.alpha * reading[i] + (1 - p.alpha) * last[i]
-            )  # x_{t-1} as it entered the window, not the reading
+            # x_{t-1} as it entered the window, not the reading
+            value[i] = p.alpha * reading[i] + (1 - p.alpha) * last[i]
     return value
 
 

@@ -49,10 +49,9 @@ def reference_of(
     number, rate = _at(desired, now)
     R, here, gain = kin.rotation[model.ee], kin.position[model.ee], params.position_gain_1_s
     if desired.kind is DesiredKind.TWIST:
-        goal, lasting = (
-            (orientation, orientation) if not number[3:].any() else (_leading_rotation(R, number[3:], params), R)
-        )
-        return MotionReference(scale * number[:3], here, goal, lasting)
+        turning = bool(number[3:].any())
+        goal = _leading_rotation(R, number[3:], params) if turning else orientation
+        return MotionReference(scale * number[:3], here, goal, R if turning else orientation)
     if desired.kind is DesiredKind.POSE:
         velocity = rate[:3] + gain * (number[:3] - here)
         share = scale * _share(velocity, rate[:3], params)

@@ -61,7 +61,6 @@ class RobotModel:
         """The body, base included."""
         self.hinges = _hinges(self._model)
         """Tree of the links, for compiled code."""
-        self._shapes = (len(self.links), 3), (len(self.links), 3, 3), (self.n, 3)
         self.moved_by: BoolArray = self._moved_by()
         """(L, n) whether a joint moves a link."""
         self.body: Capsules = self.capsules.of_links(np.flatnonzero(self.moved_by.any(axis=1)))
@@ -138,10 +137,10 @@ class RobotModel:
     def kinematics(self, q: FloatArray) -> Kinematics:
         """Compute poses and joint axes at joint positions q (n,) [rad]."""
         angles = np.ascontiguousarray(q, np.float64)
-        origins, orientations, axes = self._shapes
-        if angles.shape != axes[:1]:  # compiled code reads on behind the end
+        links, n = len(self.links), self.n
+        if angles.shape != (n,):  # compiled code reads on behind the end
             raise ValueError(f"Joint positions have the shape {angles.shape}: give {self.n} of them.")
-        kin = Kinematics(np.empty(origins), np.empty(orientations), np.empty(axes), np.empty(axes))
+        kin = Kinematics(np.empty((links, 3)), np.empty((links, 3, 3)), np.empty((n, 3)), np.empty((n, 3)))
         place(self.hinges, angles, kin)
         return kin
 

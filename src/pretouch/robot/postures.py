@@ -130,16 +130,12 @@ def nearest_points(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -
     For parallel segments, any nearest pair is right.
     """
     u, v, w = b - a, d - c, a - c
-    uu, uv, vv, uw, vw = (_dot(*pair) for pair in ((u, u), (u, v), (v, v), (u, w), (v, w)))
+    uu, uv, vv, uw, vw = (np.einsum("...i,...i->...", *pair) for pair in ((u, u), (u, v), (v, v), (u, w), (v, w)))
     area = uu * vv - uv * uv
     on_first = _within(uv * vw - uw * vv, np.where(area > 1e-12 * uu * vv, area, 0.0))
     on_second = _within(uv * on_first + vw, vv)
     on_first = _within(uv * on_second - uw, uu)
     return a + on_first[..., None] * u, c + on_second[..., None] * v
-
-
-def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.einsum("...i,...i->...", a, b)
 
 
 def _within(numerator: FloatArray, denominator: FloatArray) -> FloatArray:

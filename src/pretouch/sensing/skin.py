@@ -263,11 +263,8 @@ def _unit_from(entry: Any, types: dict[str, Sensor]) -> SensorUnit:
     T[:3, :3], T[:3, 3] = _rotation(*table.quaternion_wxyz), table.position_m
     touch = changed_by(TouchPatch(), table.touch, f"{name}: touch") if isinstance(table.touch, dict) else None
     sensor = sensor_called(table.sensor, name, types)
-    touch, sigmas = (
-        TouchPatch() if table.touch is True else touch,
-        (table.position_sigma_m, table.orientation_sigma_rad),
-    )
-    return SensorUnit(table.id, table.link, T, *sigmas, touch, sensor)
+    sigmas = table.position_sigma_m, table.orientation_sigma_rad
+    return SensorUnit(table.id, table.link, T, *sigmas, TouchPatch() if table.touch is True else touch, sensor)
 
 
 def _rotation(w: float, x: float, y: float, z: float) -> FloatArray:
