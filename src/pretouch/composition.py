@@ -130,12 +130,8 @@ def changed(value: Any, changes: Mapping[str, str], where: str = "") -> Any:
         if tree:
             if not is_dataclass(now):
                 first = next(iter(kind.choices())) if _is_part(kind) else "on"
-                why = (
-                    f"{path} is none: choose it first, as {path}={first}"
-                    if now is None
-                    else f"{path} is a single value"
-                )
-                raise ParameterError(f"{path}.{next(iter(tree))} cannot be set, because {why}.")
+                why = f"none: choose it first, as {path}={first}" if now is None else "a single value"
+                raise ParameterError(f"{path}.{next(iter(tree))} cannot be set, because {path} is {why}.")
             now = changed(now, tree, path)
         new[name] = now
     return replace(value, **new) if new else value

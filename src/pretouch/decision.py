@@ -161,11 +161,8 @@ class Decision:
         p, now, memory, controller, mode = self.profile, self.now, self.memory, self.controller, self.mode
         missed = bool(self.silent or self.lost)
         phase, goal = memory.get("pace.phase"), memory.get("rotation_goal").copy()
-        near, command, mass = (
-            near_of(now, "scene.total"),
-            memory.get("command").copy(),
-            memory.part("mass", VirtualMass),
-        )
+        near, mass = near_of(now, "scene.total"), memory.part("mass", VirtualMass)
+        command = memory.get("command").copy()
         noticed = ReactionInputs(mode, self.kin, self.robot, detection, near, missed, command, phase, resume, mass)
         answers, reaction = p.react.sense(self.state.reaction, controller.body, noticed)
         self.mode = next_mode(mode, self.events | answers, resume)
@@ -213,11 +210,8 @@ class Decision:
 def move_restricted(controller: "Controller", part: Restriction, state: object, memory: Flat, now: Flat) -> object:
     """Move within the rows of a restriction in plain Python; return its state."""
     request, kin = now.part("request", MotionRequest), now.part("kin", Kinematics)
-    robot, obstacles, velocity = (
-        robot_of(now.part("robot", Report)),
-        near_of(now, "scene.total"),
-        request.velocity.copy(),
-    )
+    robot, obstacles = robot_of(now.part("robot", Report)), near_of(now, "scene.total")
+    velocity = request.velocity.copy()
     allowed, state = part.step(state, controller.motion_body, kin, robot, obstacles, request)
     if allowed.velocity is not None:
         request.velocity[:] += allowed.velocity
