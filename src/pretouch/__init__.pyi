@@ -3,7 +3,6 @@
 from pretouch import desired as desired
 from pretouch import loop as loop
 from pretouch import realtime as realtime
-from pretouch.arms.other_arm import OtherArm as OtherArm
 from pretouch.composition import describe as describe
 from pretouch.contact.admittance import Admittance as Admittance
 from pretouch.contact.detector import Body as Body
