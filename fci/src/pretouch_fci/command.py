@@ -4,7 +4,7 @@ import csv
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -50,14 +50,14 @@ class ServeFci(FciOptions):
     """Side of the board."""
     stiffness: Annotated[float, Check(low=0.0, open_low=True, high=1e6)] = 25_000.0
     """Contact stiffness of board and boxes [N/m]."""
-    box: tuple[str, ...] = ()
+    box: list[str] = field(default_factory=list)
     """Boxes in the empty scene, each X,Y,Z:DX,DY,DZ: centre and edges [m], base frame."""
     start: str = "ready"
     """Initial posture of the arm: ready, its usual one, path, that at the start of the path, or seven joint angles
     between commas [rad]."""
     seed: Count = 0
     """Seed of the simulated arm and scene: each arm has different errors and noise, each scene different positions."""
-    push: tuple[str, ...] = ()
+    push: list[str] = field(default_factory=list)
     """Forces on the arm at its TCP, each T:FX,FY,FZ or T:FX,FY,FZ:DURATION [s, N, s], base frame, up to
     1000 N. T counts from the start of the server; in lockstep, from the first motion on, while the arm moves."""
     hand: bool = False

@@ -26,13 +26,13 @@ _LISTED = {
     int: ("N,N,...", "whole numbers"),
 }
 REGISTRY = tyro.constructors.ConstructorRegistry()
-"""How tyro reads tuples of any length: as values between commas."""
+"""How tyro reads tuples of any length: as values between commas. Lists are values that each are a word."""
 
 
 @REGISTRY.primitive_rule
 def _listed(info: tyro.constructors.PrimitiveTypeInfo) -> PrimitiveConstructorSpec[tuple[Any, ...]] | None:
     kind, *rest = get_args(info.type) or (None,)
-    if info.type_origin is not tuple or rest != [...]:
+    if info.type_origin is not tuple or rest != [...] or kind not in _LISTED:
         return None
     metavar, noun = _LISTED[kind]
 

@@ -3,7 +3,7 @@
 import csv
 import sys
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import tyro
@@ -19,11 +19,11 @@ class Sweep(Playing, SweepOptions):
     The same command continues a run that was stopped. It needs the extra `sweep`.
     """
 
-    vary: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    vary: tyro.conf.UseAppendAction[list[str]] = field(default_factory=list)
     """Parameter and range: NAME=LOW:HIGH, NAME=LOW:HIGH:log, or NAME=VALUE,VALUE; for a grid NAME=LOW:HIGH:LEVELS.
     NAME is GROUP.FIELD of the profile, plant.FIELD, plant.kind, plant.world (a set of docs/how-to/sim-to-real.md),
     sensing.FIELD, skin.units or scene.FIELD. Give the option as often as there are parameters."""
-    fix: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    fix: tyro.conf.UseAppendAction[list[str]] = field(default_factory=list)
     """Parameter with a fixed value in all cells: NAME=VALUE."""
 
     def run(self) -> None:
@@ -61,7 +61,7 @@ class Sweep(Playing, SweepOptions):
             about = {"version": __version__, "experiment": sweep.experiment, "profile": sweep.profile}
             write(about | {"vary": vary, "fixed": fix, "results": results})
 
-    def _pairs(self, option: str, texts: tuple[str, ...]) -> dict[str, str]:
+    def _pairs(self, option: str, texts: list[str]) -> dict[str, str]:
         """Read NAME=TEXT, each name once; paths of worlds become absolute for workers elsewhere."""
         pairs: dict[str, str] = {}
         for text in texts:
