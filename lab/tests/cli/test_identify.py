@@ -49,7 +49,7 @@ def test_without_velocities_no_torque_noise_is_told_and_the_other_sign_turns_off
 @pytest.mark.parametrize(
     ("header", "said"),
     [
-        ("q1_rad", "but not time_s and not tau_ext1_Nm"),
+        ("q1_rad", "but no times (time_s) and no torques (tau_ext1_Nm ... or tau1_Nm ...): add columns"),
         ("time_s," + ",".join(f"q{j}_rad,tau{j}_Nm" for j in range(1, 8)), "an observer over them needs velocities"),
     ],
 )
