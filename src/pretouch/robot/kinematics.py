@@ -55,7 +55,7 @@ class Mechanism(NamedTuple):
     arm: ArmTopology
     links: Links
     upright: Annotated[FloatArray, 3, 3]
-    """(3, 3) turns vectors of the base frame into a frame whose z points against gravity."""
+    """(3, 3) turns vectors of the base frame into one whose z points against gravity: unity for an arm that stands."""
 
 
 class Kinematics(NamedTuple):

@@ -40,10 +40,10 @@ class RobotModel:
             ) from error
         self._model.dof_armature[:] = 0.0
         self._model.dof_damping[:] = 0.0
-        upright = np.empty((3, 3))
-        upright[2] = 0.0 - description.gravity / np.linalg.norm(description.gravity)
-        tangents_of(upright[2], upright[:2])
-        self.gravity: FloatArray = 0.0 - G_M_S2 * upright[2]
+        up, across = 0.0 - description.gravity / np.linalg.norm(description.gravity), np.empty((2, 3))
+        tangents_of(up, across)
+        upright = np.array([0.0 - across[1], across[0], up])
+        self.gravity: FloatArray = 0.0 - G_M_S2 * up
         """(3,) acceleration by gravity, base frame [m/s^2]."""
         self._model.opt.gravity[:] = self.gravity
         self._data = mujoco.MjData(self._model)
