@@ -168,6 +168,7 @@ def test_the_stretched_fr3_weighs_what_its_links_do_however_it_is_mounted(gravit
     _, bias = model.mass_matrix_and_bias(*np.zeros((3, 7)))
     assert bias[:2] == pytest.approx(np.multiply(shares, torque), abs=1e-3)
     np.testing.assert_allclose(weights_of(model, np.zeros(7)) @ model.gravity, bias, atol=1e-9)
+    np.testing.assert_allclose(model.mechanism.upright @ model.gravity, (0, 0, -9.81), atol=1e-9)
 
 
 @pytest.mark.parametrize("disturbance", [1.0, np.nan, np.inf])

@@ -21,6 +21,6 @@ def rig(panda_model: RobotModel) -> Callable[..., Rig]:
              pose: np.ndarray = FORWARD, sensor: Sensor = PAPER_SENSOR, **params: object) -> Rig:  # fmt: skip
         skin = Skin([SensorUnit(f"unit_{i}", link, pose, sensor=sensor) for i in range(units)], panda_model)
         plant = Plant(panda_model, SceneSpec(boxes, hand), NO_ERROR, panda_model.description.q_ready, seed)
-        return Rig(plant, RangeFinders(plant, skin, RangeFinderParams(**params), seed))
+        return Rig(plant, RangeFinders(plant, skin, RangeFinderParams(**params), seed), skin)
 
     return make

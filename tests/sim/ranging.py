@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pretouch.sensing.skin import Skin
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinders
@@ -36,6 +37,7 @@ class Rig:
 
     plant: Plant
     finders: RangeFinders
+    skin: Skin
 
     def collect(self, duration: float) -> dict[str, np.ndarray]:
         """Each reading that became the newest of its unit: when it was seen, unit, stamp, distance, status."""

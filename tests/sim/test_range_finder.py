@@ -220,7 +220,7 @@ def test_what_is_sent_is_what_would_have_been_read(panda_model, paper_skin, rig)
     at_once = {"latency_s": 0.0, "jitter_s": 1e-6, "dropout": 0.0}
     samples = sent(panda_model, paper_skin, 0.5, wall(0.5), **at_once)
     plant = Plant(panda_model, SceneSpec(boxes=(wall(0.5),)), NO_ERROR, panda_model.description.q_ready, 0)
-    read = Rig(plant, RangeFinders(plant, paper_skin, RangeFinderParams(**at_once), 0)).collect(0.5)
+    read = Rig(plant, RangeFinders(plant, paper_skin, RangeFinderParams(**at_once), 0), paper_skin).collect(0.5)
     told = sorted((s.unit, s.time, s.distance, s.status) for s in samples)
     seen = sorted(zip(*(read[key].tolist() for key in ("unit", "stamp", "distance", "status")), strict=True))
     assert len(told) >= len(seen) > 150

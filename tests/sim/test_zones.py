@@ -47,12 +47,11 @@ def test_what_is_beside_the_axis_is_seen_where_it_is(rig, panda_model):
     for sensor in (VL53L5CX(), EIGHT):
         seen_by = rig(hand=hand, sensor=sensor, **EXACT)
         seen_by.collect(0.2)
-        skin = seen_by.finders._skin
-        watcher = Watcher(panda_model, skin, no_fixtures(), profile("pretouch").perception)
+        watcher = Watcher(panda_model, seen_by.skin, no_fixtures(), profile("pretouch").perception)
         seen = watcher.take(seen_by.finders.read(), seen_by.plant.time)
         off = np.linalg.norm(seen.point - hand.start, axis=1) - 0.05
         assert len(off) >= 1
-        assert off.max() < 0.3 * 2 * np.tan(skin.units[0].sensor.angle / 2)
+        assert off.max() < 0.3 * 2 * np.tan(seen_by.skin.units[0].sensor.angle / 2)
         # the nearest of what is seen is no farther than it truly is, but for 1 cm
         truly = np.linalg.norm(seen.body_point - hand.start, axis=1) - 0.05
         assert truly.min() - 0.04 < seen.body_distance.min() < truly.min() + 0.01
