@@ -83,7 +83,7 @@ class Visitor:
 
     def wait_for_callbacks(self) -> None:
         """Wait until all that viser does in threads of its own for what was said has been done."""
-        self._server._thread_executor.submit(int).result()
+        self._server._thread_executor.submit(int).result(PATIENCE_S)
 
     def settle(self) -> None:
         """Wait until all that was said has been heard: what is said last is where somebody looks from."""
