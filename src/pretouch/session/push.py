@@ -46,9 +46,9 @@ class Direction:
 
 
 DIRECTIONS = (
-    Direction((0.0, 1.0, 0.0), "+y, to the left as seen from the base looking out over the arm"),
+    Direction((0.0, 1.0, 0.0), "+y, to the left from the base looking out over the arm, its mounting underfoot"),
     Direction((1.0, 0.0, 0.0), "+x, straight away from the base"),
-    Direction((0.0, 0.0, 1.0), "+z, straight up from below"),
+    Direction((0.0, 0.0, 1.0), "+z, straight away from what the base is mounted on: up from below if the arm stands"),
 )
 
 
