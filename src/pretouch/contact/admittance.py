@@ -153,7 +153,8 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
             settle(mass, self)
         elif doing in ("react", "soft"):
             band, axes = dead_band(body.model.description.tau_max, self), _axes(body, inputs.kin)
-            contact = detection.evidence >= 1.0
+            # a hand may press less than it did, and a detector needs less evidence that it still does
+            contact = detection.evidence >= 1.0 or (detection.suspected and mass.no_contact[0] < self.quiet_s)
             yield_to(mass, residual, inputs.command, band, axes, self.numbers, body.period, contact)
             if doing == "soft" and clamp.torque:
                 # it may be moved out of the clamp, not back into it
@@ -183,9 +184,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         # there the sample itself counts.
         before = {"soft": inputs.mass.steady[0], "still": torque}.get(doing, inputs.mass.torque)
         begin(inputs.mass, _axes(body, kin), torque, before, band, self)
-        place, contact = state.place, None
-        if doing == "task":
-            contact = inputs.detection.contact
+        place, contact = state.place, inputs.detection.contact if doing == "task" else None
         if contact is not None and self.give_up is not None:
             q, force = inputs.robot.q, float(np.linalg.norm(contact.force))
             kinetic = 0.5 * float(command @ model.mass_matrix(q) @ command)

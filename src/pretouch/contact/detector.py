@@ -70,6 +70,8 @@ class Detection:
     """(n,) external joint torques less the detector's model of free motion [Nm]; NaN without torques."""
     evidence: float
     """Evidence for a contact: from 1 on there is one, while armed."""
+    suspected: bool = False
+    """True if a contact is suspected: one that has been detected may have become lighter."""
     lasting: bool = False
     """True while the detector decides whether the residual is a load or an error of the estimate: the arm waits."""
     touched: Touched = field(default_factory=lambda: NOT_TOUCHED)

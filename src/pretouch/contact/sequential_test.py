@@ -61,16 +61,15 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
         if sample.doubted_kg:
             before = before._replace(model=widen_for_load(before.model, sample.doubted_kg))
         tested, test = self._assess(before, body, sample, cues)
-        ratio, bands, significant = float(tested.log_likelihood_ratio[0]), Thresholds(*tested.bands), None
+        ratio, bands, armed = float(tested.log_likelihood_ratio[0]), Thresholds(*tested.bands), sample.armed
         if self.localise:
             location = localise(location or NO_CONTACT, body, sample, cues, tested, self.localise)
-        if ratio >= 1.0:
-            significant = most_significant_mean(tested, body.period, self.localise or _USUAL)
-        contact = strongest(tested.force, bands) if ratio >= 1.0 and sample.armed else None
+        significant = most_significant_mean(tested, body.period, self.localise or _USUAL) if ratio >= 1.0 else None
+        contact = strongest(tested.force, bands) if ratio >= 1.0 and armed else None
         lasting, detectable = bool(tested.lasting[0]), float(tested.detectable_n[0])
-        place = location.touched if self.localise and location else NOT_TOUCHED
+        at = location.touched if self.localise and location else NOT_TOUCHED
         detection = Detection(
-            bands, contact, sample.armed, tested.residual, ratio, lasting, place, significant, detectable
+            bands, contact, armed, tested.residual, ratio, ratio >= self.suspect, lasting, at, significant, detectable
         )
         return detection, SequentialTestState(test, location if self.localise else None, touched)
 

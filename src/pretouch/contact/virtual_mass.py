@@ -48,7 +48,7 @@ class VirtualMass(NamedTuple):
     quiet: Cell
     """Time since a torque last moved a joint [s]."""
     no_contact: Cell
-    """Time since the last detected contact [s]."""
+    """Time since the last detected contact [s], infinite without one."""
     since: Cell
     """Time since the contact at the start of the reaction [s], infinite without one."""
     path: Annotated[FloatArray, "M", "n"]
@@ -66,9 +66,9 @@ def mass_init(n: int, params: AdmittanceParams) -> VirtualMass:
 
 def settle(mass: VirtualMass, params: AdmittanceParams) -> None:
     """Reset the reaction: the mass is at rest."""
-    for part in (mass.velocity, mass.side, mass.steady, mass.sliding, mass.quiet, mass.no_contact):
+    for part in (mass.velocity, mass.side, mass.steady, mass.sliding, mass.quiet):
         part[:] = 0.0
-    mass.tank[0], mass.since[0] = params.start_energy_j, math.inf
+    mass.tank[0], mass.since[0], mass.no_contact[0] = params.start_energy_j, math.inf, math.inf
 
 
 def dead_band(torque_limit: FloatArray, params: AdmittanceParams) -> FloatArray:
@@ -112,7 +112,7 @@ def begin(
     velocity = velocity * min(1.0, params.speed_max_m_s / max(fastest_point(axes, velocity), _LEAST_M_S))
     settle(mass, params)
     mass.torque[:], mass.velocity[:], mass.side[:] = torque, velocity, np.sign(drive)
-    mass.steady[0], mass.steady[1], mass.sliding[:], mass.since[0] = torque, lesser, np.abs(mass.side), 0.0
+    mass.steady[:], mass.sliding[:], mass.since[0], mass.no_contact[0] = (torque, lesser), np.abs(mass.side), 0.0, 0.0
 
 
 _MEAN_S = 0.5

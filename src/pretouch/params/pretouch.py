@@ -67,7 +67,7 @@ class SequentialParams(Checked):
     clear_m: Positive = 0.3
     """Body distance without obstacles that the learning of a lasting residual requires [m]."""
     suspect: Annotated[float, Check(low=0.05, high=1.0)] = 0.6
-    """Evidence from which a contact is suspected, so that neighbouring samples are not learnt [1]."""
+    """Evidence from which a contact is suspected [1]: one that has been detected counts on while it is."""
     relearn_after_s: NonNegative = 5.0
     """Time after which a residual that looks like a contact is learnt [s], if without obstacles the same change of a
     load or the same small torque on one joint explains it all the time; 0: never. The arm waits for that time."""
