@@ -182,8 +182,7 @@ def _fitted(hold: FloatArray, weights: FloatArray, qd: FloatArray) -> tuple[Floa
     Returns its acceleration (3,) [m/s^2], how many times the true one that is, and the squares that it leaves.
     """
     gravity = np.asarray(np.linalg.lstsq(weights.reshape(-1, 3), hold.ravel())[0], np.float64)
-    left = _left(hold - weights @ gravity, qd)
-    return gravity, float(np.linalg.norm(gravity)) / G_M_S2, float(left.sum())
+    return gravity, float(np.linalg.norm(gravity)) / G_M_S2, float(_left(hold - weights @ gravity, qd).sum())
 
 
 def _check_signs(
@@ -230,23 +229,25 @@ def _mounted(
     """Return the arm with the direction of gravity that measured torques have, and a note where it is another one.
 
     `motion` has positions, velocities and torques (N, n), `expected` (S, n) is by the description. Of explanations that
-    leave little, and far less than the description, one must leave far less than the others. RecordingError for others
-    than gravity, for two that are alike, for a direction that somebody gave otherwise, and for external torques.
+    leave little, and far less than the description with a load that it lacks, one must leave far less than the others.
+    RecordingError for others than gravity, for two that are alike, for a direction given otherwise, and if external.
     """
     q, speed, tau = map(_some, motion)
-    loads = [choice.payload * model.ee_jacobian(model.kinematics(p))[:3].T for p in q]
-    weights = np.array([weights_of(model, p) for p in q]) - loads
+    weights = np.array(
+        [weights_of(model, p) - choice.payload * model.ee_jacobian(model.kinematics(p))[:3].T for p in q]
+    )
     weight, external = weights @ model.gravity, "external " if kind == "tau_ext" else ""
     # an interface takes for external the torque of the gravity that it knows less that of the true one
     hold = weight - tau if external else tau - expected + weight
-    same, whole, free = (float(_left(x, speed).sum()) for x in (hold - weight, tau, hold))
+    same, whole, free, heavy = (float(_left(x, speed).sum()) for x in (hold - weight, tau, hold, weight))
     gravity, size, left = _fitted(hold, weights, speed)
     down, lean = _direction(gravity), lean_of(model, gravity)
-    if not external and same > _MOST * whole and size < _LIGHT and left > _MOST * free:
+    if not external and free < _LITTLE * heavy and size < _LIGHT and left > _MOST * free:
         raise RecordingError(
             f"The torques in {place} have no gravity in them, so they are external or commanded ones (tau_J_d): name"
             " external torques tau_ext1_Nm and so on, or give those that were measured."
         )
+    rival = min(same, left) if lean < _LEAN_DEG and _LIGHT < size < _HEAVY else same
     explanations = list[tuple[float, str, str]]()
     if lean > _LEAN_DEG and _LIGHT < size < _HEAVY:
         tell = "tell the robot, or name measured torques tau1_Nm and so on, with" if external else "give"
@@ -260,10 +261,12 @@ def _mounted(
         rest = rest if _LIGHT < size < _HEAVY else np.inf
         explanations.append((rest, turned, f"give the other --sign and --gravity {_direction(other)}"))
         scale = (tau * expected).sum(axis=0) / np.maximum((expected**2).sum(axis=0), 1e-12)
+        # where gravity does little, friction hides the scale, and none is needed
+        scale *= scale**2 * (expected**2).sum(axis=0) > _LITTLE * (tau**2).sum(axis=0)
         times = f"the model's times {', '.join(f'{x:.2g}' for x in scale)}, joint by joint, as motor currents are"
-        rest = float(_left(tau - scale * expected, speed).sum()) if (scale > 0.0).all() else np.inf
+        rest = float(_left(tau - scale * expected, speed).sum()) if (scale >= 0.0).all() else np.inf
         explanations.append((rest, times, "name the columns current1_A and so on, and give --gains"))
-    good = sorted(e for e in explanations if e[0] < min(_LITTLE * whole, _FAR_BETTER * same))
+    good = sorted(e for e in explanations if e[0] < min(_LITTLE * whole, _FAR_BETTER * rival))
     good = good[: 1 if len(good) < 2 or good[0][0] < _FAR_BETTER * good[1][0] else 2]
     if not good:
         return model, []
@@ -271,9 +274,8 @@ def _mounted(
     if len(good) > 1 or external or own or good[0][0] != left:
         what, way = (" or ".join(str(e[i]) for e in good) for i in (1, 2))
         raise RecordingError(f"The {external}torques in {place} are {what}: {way}.")
-    values: dict[str, float | str] = {"degrees": lean, "share": left / whole, "before": same / whole, "gravity": down}
     model = RobotModel(replace(model.description, gravity=np.array([float(x) for x in down.split(",")])))
-    return model, [Note("mounting", values)]
+    return model, [Note("mounting", {"degrees": lean, "share": left / whole, "before": same / whole, "gravity": down})]
 
 
 def _check_rate(place: Path, time: FloatArray) -> None:
