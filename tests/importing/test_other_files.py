@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from tests.importing.made import INERTIAL, link, six_axis, written
 from tests.importing.test_robot_import import mjcf
-from tests.needs import skip_for
 
 from pretouch.errors import RobotModelError
 from pretouch.importing.chain import arm_of, limits_of
@@ -155,10 +154,6 @@ def test_another_undefined_prefix_is_not_taken_for_xacro(tmp_path):
 
 
 def test_xacro_is_expanded_with_its_arguments_where_a_package_is_installed(tmp_path):
-    from importlib.util import find_spec
-
-    if not (find_spec("xacrodoc") or find_spec("xacro")):
-        skip_for("pip install xacrodoc")
     file = written(tmp_path, TEMPLATES[0].replace("sixer", "$(arg name)"), "arm.xacro")
     with pytest.raises(RobotModelError, match=r"cannot be expanded: .* give its arguments by --xacro NAME:=VALUE"):
         read_robot(file)
@@ -171,8 +166,6 @@ def test_xacro_is_expanded_with_its_arguments_where_a_package_is_installed(tmp_p
     use = '<xacro:include filename="$(find my_macros)/m.xacro"/><xacro:more name="cover"/>'
     text = six_axis(use).replace("<robot", f"<robot{XACRO}").replace("</robot>", "")
     text += '<joint name="c" type="fixed"><parent link="link6"/><child link="cover"/></joint></robot>'
-    if not find_spec("xacrodoc"):
-        skip_for("pip install xacrodoc")
     assert "cover" in [one.name for one in read_robot(written(tmp_path, text), (tmp_path / "macros",)).links]
 
 
