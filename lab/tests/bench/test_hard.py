@@ -64,9 +64,9 @@ def test_a_hard_arm_moves_and_sees_without_a_controller_as_with_one(monkeypatch)
     assert made.count.max() > 0
     np.testing.assert_array_equal(made.watched, controlled.watched)
     np.testing.assert_array_equal(made.count, controlled.count)
-    for part in ("robot", "obstacles"):
-        for name, numbers in getattr(controlled, part).items():
-            np.testing.assert_array_equal(getattr(made, part)[name], numbers)
+    ours, theirs = (one.robot | one.obstacles._asdict() for one in (made, controlled))
+    for name, numbers in theirs.items():
+        np.testing.assert_array_equal(ours[name], numbers)
     for name, numbers in alone.robot.items():  # nobody near, no units
         np.testing.assert_array_equal(numbers, made.robot[name])
 
