@@ -84,21 +84,21 @@ class CoverageSetting:
     def draw(self, sample: int = 0) -> tuple[Ways, Ways, Ways]:
         """Draw ways of what comes, of what the moving arm meets, and of what its hand meets; another `sample` differs.
 
-        What is met is at rest. The hand moves either way on its path, or in any direction. The last are the ends of its
-        ways along each axis of the end-effector, both ways. All six have the same weight, also the one that the fingers
-        point to, where there is little surface.
+        What is met is at rest. The hand moves either way on its path, or in any direction. The last are its ways to both
+        sides along three random axes at right angles. All six have the same weight, also the one that the fingers point
+        to, where there is little surface.
         """
         model, room, rng = self.model, self.room, np.random.default_rng([self.seed, 51, sample])
         q, along = postures(model, room, self.workspace, self.postures, rng)
         ways = ways_to(model, room, self.params, q, np.repeat(np.arange(len(model.surface.link)), _EACH), rng)
         to = rng.normal(size=(self.postures, 3))
         to = to / np.linalg.norm(to, axis=1, keepdims=True) if along is None else np.sign(to[:, :1]) * along
-        axes = np.array([model.kinematics(row).rotation[model.ee].T for row in q])
+        axes = np.linalg.qr(rng.normal(size=(self.postures, 3, 3)))[0]
         axes = np.concatenate([axes, -axes], axis=1).reshape(-1, 3)
-        close = ways_met(model, room, self.params.close(), np.repeat(q, 6, axis=0), axes)
-        weight = np.where(model.rigid[close.surface.link] == model.rigid[model.ee], close.weight, 0.0)
-        weight /= np.maximum(weight @ close.surface.area, 1e-12)[:, None]
-        return ways, ways_met(model, room, self.params.standing(), q, to), replace(close, weight=weight)
+        hand = ways_met(model, room, self.params.standing(), np.repeat(q, 6, axis=0), axes)
+        weight = np.where(model.rigid[hand.surface.link] == model.rigid[model.ee], hand.weight, 0.0)
+        weight /= np.maximum(weight @ hand.surface.area, 1e-12)[:, None]
+        return ways, ways_met(model, room, self.params.standing(), q, to), replace(hand, weight=weight)
 
 
 def postures(

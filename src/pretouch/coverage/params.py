@@ -8,9 +8,6 @@ from pretouch.coverage.sighting import GRID_M
 from pretouch.errors import ParameterError
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor
 
-SLOW_M_S = 0.05
-"""Speed of a hand that is about to touch [m/s] (`BrakingParams.touch_speed_max_m_s`)."""
-
 
 @dataclass(frozen=True)
 class CoverageParams(Checked):
@@ -52,12 +49,6 @@ class CoverageParams(Checked):
         """Return the same for objects at rest, with ways of twice the stopping distance."""
         still = Resting(**vars(self) | {"object_speed_m_s": 0.0})
         return replace(still, way_m=max(2 * still.warning_m, (still.first + still.run) * GRID_M))
-
-    def close(self) -> "CoverageParams":
-        """Return the same for the last stretch before such an object: slowly, from the stopping distance on."""
-        still = self.standing()
-        slow = replace(still, arm_speed_m_s=min(SLOW_M_S, self.arm_speed_m_s))
-        return replace(slow, way_m=max(still.warning_m, (slow.first + slow.run) * GRID_M))
 
     @property
     def closing_m_s(self) -> float:

@@ -25,7 +25,7 @@ HEIGHT_M = 0.008
 _CLEAR_M = 0.4
 """Least free length of a place's beam in the ready posture [m]."""
 _ASIDE = 0.5
-"""Least sine of the angle between a normal and the hand's axis for a beam tilted along it."""
+"""Least sine of the angle between a normal and an axis of the hand for a beam tilted along it."""
 _SPACING_M = 0.055
 """Distance between candidate places [m]; a Panda has about 300."""
 
@@ -42,16 +42,16 @@ class Suggestion:
 def candidates(ways: Ways, skin: Skin, sensor: Sensor = PAPER_SENSOR) -> tuple[SensorUnit, ...]:
     """Return units with a sensor all over the arm, with outward beams along the normal.
 
-    At the hand, what moves with the end-effector, there are also beams at 45 degrees from it, along the end-effector's
-    z axis and against it. In the ready posture, the beam of the paper's sensor is free there.
+    At the hand, what moves with the end-effector, there are also beams at 45 degrees from it, along each of the
+    end-effector's axes and against it. In the ready posture, the beam of the paper's sensor is free there.
     """
     model = ways.model
     kin = model.kinematics(model.description.q_ready)
     at = surface_of(model.body, model.moved_by, kin, _SPACING_M)
     units, hand = list[SensorUnit](), model.rigid == model.rigid[model.ee]
     for i, (link, point, normal) in enumerate(zip(at.link.tolist(), at.point, at.normal, strict=True)):
-        axis = kin.rotation[link].T @ kin.rotation[model.ee][:, 2]
-        beams = [normal, *_tilted(normal, axis)] if hand[link] else [normal]
+        axes = (kin.rotation[link].T @ kin.rotation[model.ee]).T if hand[link] else ()
+        beams = [normal, *(beam for axis in axes for beam in _tilted(normal, axis))]
         poses = [_outward_pose(point, normal, beam) for beam in beams]
         if (below := seat(model, link, poses[0][:3, 3])) and below.height >= 0:  # not inside another capsule
             units += [SensorUnit(f"place {i}.{k}", model.links[link], pose) for k, pose in enumerate(poses)]
