@@ -193,6 +193,17 @@ def test_torques_of_another_kind_are_refused_and_named(tmp_path, panda_model, sh
         read_torques(write_csv(tmp_path / "a.csv", columns), Choice(**choice))
 
 
+@pytest.mark.parametrize("kg", [2.0, 2.7, 5.0])
+def test_a_load_that_nobody_named_is_no_other_mounting_and_no_current(tmp_path, panda_model, short, kg):
+    J = np.array([panda_model.ee_jacobian(panda_model.kinematics(q))[:3].T for q in short.q])
+    tau = short.driving + kg * J @ [0.0, 0.0, 9.81]
+    columns = short.columns(("q*_rad", short.q), ("dq*_rad_s", short.qd), ("tau*_Nm", tau))
+    notes = read_torques(write_csv(tmp_path / "a.csv", columns), Choice()).notes
+    (load,) = (note for note in notes if note.code == "load")
+    assert load.values["kg"] == pytest.approx(kg, abs=0.3)
+    assert "mounting" not in codes(notes)
+
+
 def test_external_torques_of_an_arm_that_is_mounted_otherwise_than_it_thinks_are_refused(tmp_path, panda_model, short):
     weight = np.array([weights_of(panda_model, q) for q in short.q])
     file = external(short, tmp_path / "a.csv", short.tau_ext + weight @ [-9.81, 0.0, -9.81])

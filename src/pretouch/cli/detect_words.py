@@ -42,6 +42,8 @@ _SENTENCES = {
     "mounting": "By the torques gravity points along {gravity} in the base frame, {degrees:.0f} degrees from where the"
     " arm's description has it. It is taken so, for the model then leaves {share:.1%} of them unexplained and not"
     " {before:.0%}: give --gravity {gravity}, or write it to robot.toml.",
+    "load": "By the torques the arm carries {kg:.1f} kg at its end-effector: with that the model leaves {share:.1%} of"
+    " them unexplained and not {before:.0%}. Give --payload {kg:.1f}.",
     "no_commands": "There are no commanded velocities (dq_d1_rad_s ...): the measured ones, smoothed, stand in.",
     "unexplained": "The model of {arm} leaves {share:.0%} of the torques unexplained, so results may be wrong: check"
     " --arm, --payload, units and how the arm is mounted.",

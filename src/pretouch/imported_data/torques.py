@@ -228,14 +228,14 @@ def _mounted(
 ) -> tuple[RobotModel, list[Note]]:
     """Return the arm with the direction of gravity that measured torques have, and a note where it is another one.
 
-    `motion` has positions, velocities and torques (N, n), `expected` (S, n) is by the description. Of explanations that
-    leave little, and far less than the description with a load that it lacks, one must leave far less than the others.
+    `motion` has positions, velocities and torques (N, n), `expected` (S, n) is by the description. A load that it lacks
+    is a note too. Of explanations that leave little, and far less than the description, one must leave far less than
+    the others.
     RecordingError for others than gravity, for two that are alike, for a direction given otherwise, and if external.
     """
     q, speed, tau = map(_some, motion)
-    weights = np.array(
-        [weights_of(model, p) - choice.payload * model.ee_jacobian(model.kinematics(p))[:3].T for p in q]
-    )
+    J = np.array([model.ee_jacobian(model.kinematics(p))[:3].T for p in q])
+    weights = np.array([weights_of(model, p) for p in q]) - choice.payload * J
     weight, external = weights @ model.gravity, "external " if kind == "tau_ext" else ""
     # an interface takes for external the torque of the gravity that it knows less that of the true one
     hold = weight - tau if external else tau - expected + weight
@@ -247,7 +247,12 @@ def _mounted(
             f"The torques in {place} have no gravity in them, so they are external or commanded ones (tau_J_d): name"
             " external torques tau_ext1_Nm and so on, or give those that were measured."
         )
-    rival = min(same, left) if lean < _LEAN_DEG and _LIGHT < size < _HEAVY else same
+    load = -J @ model.gravity  # of 1 kg more at the end-effector
+    kg = max(0.0, float((load * (hold - weight)).sum() / max((load**2).sum(), 1e-12)))
+    carried = float(_left(hold - weight - kg * load, speed).sum())
+    if not external and carried < min(_LITTLE * whole, _FAR_BETTER * same, left / _FAR_BETTER):
+        return model, [Note("load", {"kg": choice.payload + kg, "share": carried / whole, "before": same / whole})]
+    rival = min(same, carried, left if lean < _LEAN_DEG and _LIGHT < size < _HEAVY else same)
     explanations = list[tuple[float, str, str]]()
     if lean > _LEAN_DEG and _LIGHT < size < _HEAVY:
         tell = "tell the robot, or name measured torques tau1_Nm and so on, with" if external else "give"
