@@ -1,7 +1,7 @@
 """Publishing and subscribing: who comes late, who comes again, who is there, and how long a message takes."""
 
 from threading import Event
-from time import monotonic, monotonic_ns, sleep
+from time import monotonic, monotonic_ns, sleep, time
 from typing import Any
 
 import numpy as np
@@ -124,6 +124,21 @@ def test_a_unit_for_which_several_publish_is_silent_and_named_and_strangers_take
     assert node.wait_for(lambda: units.read().distance[1] == 0.5, 5)
     assert len(units._unknown) <= 64
     assert max(map(len, units._unknown)) <= 80
+
+
+def test_a_unit_that_repeats_one_value_is_named_and_one_with_nothing_near_is_not(node, other, paper_skin):
+    units = Ros2Skin(paper_skin, node, "/ranges", shared_clock=True)
+    publisher, now = other.publisher("/ranges", RANGE), time()
+    assert other.wait_for(lambda: publisher.subscribers == 1, 10)
+    coded, zero, empty, alive = paper_skin.ids[:4]
+    for ago in (20.0, 10.0):
+        publisher.publish(measured_range(now - ago, coded, 8.19, most=10.0))
+        publisher.publish(measured_range(now - ago, zero, 0.0, least=0.0))
+        publisher.publish(measured_range(now - ago, empty, 4.0))
+        publisher.publish(measured_range(now - ago, alive, 0.5 + 0.01 * ago))
+    assert node.wait_for(lambda: len(units.notes) == 2, 5)
+    named = [note.partition(":")[0] for note in units.notes]
+    assert named == [f"{coded} has sent 8.19 m for 10 s", f"{zero} has sent 0 m for 10 s"]
 
 
 @pytest.mark.slow

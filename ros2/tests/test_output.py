@@ -86,7 +86,7 @@ def test_a_step_is_published_by_standard_messages(published, listener, panda_mod
     assert rows[:, 5] == pytest.approx(step.obstacles.age, abs=1e-6)
     force = listener.last("/pretouch/force")
     assert (force.header.frame_id, force.wrench.force.z) == (panda_model.links[0], 3.0)
-    assert listener.last("/pretouch/mode").data.startswith("HOLD: The force window is filling")
+    assert listener.last("/pretouch/mode").data.startswith("HOLD: Measuring the arm's torques")
     limited = listener.last("/pretouch/limited")
     assert {pair.key: pair.value for pair in limited.values} == {
         "by": "hold", "share": "0.000", "unit": "", "link": "", "joint": "",

@@ -20,6 +20,8 @@ _NOTHING = (-math.inf, 0.0, RangeStatus.NONE)
 RANGES = "/skin/{unit}/range"
 """Topic of each unit."""
 _UNIT = "{unit}"
+_FROZEN_S = 5.0
+"""Time for which a value that repeats to the last digit may be chance [s]: some sensors round to centimetres."""
 _UNKNOWN_MOST, _SHOWN = 64, 80
 """Names of other units that are kept, and their letters."""
 
@@ -36,6 +38,8 @@ class Ros2Skin:
         self._ids, self._node, self._topic = skin.ids, node, topic
         self._stamps = [SourceStamps(shared_clock) for _ in skin.ids]
         self._newest: list[tuple[float, float, RangeStatus]] = [_NOTHING for _ in skin.ids]
+        self._same: list[tuple[float, float]] = [(math.nan, 0.0) for _ in skin.ids]
+        """Value of each unit, and since when it has not changed [s]."""
         self._unknown: set[str] = set()
         if _UNIT in topic:
             self._subscriptions = [
@@ -65,6 +69,9 @@ class Ros2Skin:
         for name, stamps in zip(self._ids, self._stamps, strict=True):
             several = f"Several publishers send as {name}: run only one; until then the unit is silent."
             sentences += [several if stamps.together() else stamps.not_newer(name)]
+        for name, (value, since), (stamp, *_) in zip(self._ids, self._same, tuple(self._newest), strict=True):
+            frozen = f"{name} has sent {value:g} m for {stamp - since:.0f} s: it is frozen, or that is its code for"
+            sentences += [f"{frozen} nothing near, which REP 117 wants as +inf." if stamp - since > _FROZEN_S else ""]
         return tuple(filter(None, sentences))
 
     def read(self) -> RangeReadings:
@@ -93,7 +100,10 @@ class Ros2Skin:
     def _take(self, unit: int, message: Any, received: float, writer: int) -> None:
         stamp = self._stamps[unit].instant(message.header, received, writer)
         if stamp is not None:
-            self._newest[unit] = (stamp, float(message.range), status_of(message))
+            value, status = float(message.range), status_of(message)
+            if value != self._same[unit][0] or status is RangeStatus.SIGNAL:  # nothing near is the same for long
+                self._same[unit] = (value, stamp)
+            self._newest[unit] = (stamp, value, status)
 
 
 def status_of(message: Any) -> RangeStatus:
