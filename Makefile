@@ -5,24 +5,30 @@ unexport PYTHONDONTWRITEBYTECODE
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+LIVE := $(VENV)/.installed-live
 
 .PHONY: setup demo live franka learn cluster ros2 units meshes browser docs micropython test test-quick test-contracts test-skipped test-slow soak golden golden-values lint house bench peers \
 	format wheel clean
 
 setup: $(STAMP)
 
-$(STAMP): pyproject.toml fci/pyproject.toml lab/pyproject.toml constraints.txt
+# what the page needs; everything for development and the lab comes with the next of `demo`, `test` and others
+$(LIVE): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "Python 3.11 or newer is needed: say make PYTHON=/path/to/python3.11"; exit 1; }
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -c constraints.txt -e '.[dev,figures,live,parquet]' -e ./fci -e './lab[sweep]'
-	$(BIN)/pretouch warm-up
+	@$(PYTHON) -m venv $(VENV)
+	@$(BIN)/python tools/install.py -c constraints.txt -e '.[live]'
+	@$(BIN)/pretouch warm-up
+	@touch $@
+
+$(STAMP): $(LIVE) fci/pyproject.toml lab/pyproject.toml
+	@$(BIN)/python tools/install.py -c constraints.txt -e '.[dev,figures,live,parquet]' -e ./fci -e './lab[sweep]'
 	@touch $@
 
 demo: setup
 	$(BIN)/pretouch demo
 
-live: setup
+live: $(LIVE)
 	$(BIN)/pretouch live
 
 # the vendor's libraries for the Panda and the FR3, 30 MB
