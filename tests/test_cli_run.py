@@ -14,7 +14,7 @@ from pretouch import cli, plugins
 from pretouch.arms import OpenedArm
 from pretouch.arms.simulated import Simulated
 from pretouch.arms.simulated.arm import ThreadedArm
-from pretouch.cli.options import RobotOptions, SkinOptions, TaskOptions
+from pretouch.cli.options import ProcessOptions, RobotOptions, SkinOptions, TaskOptions
 from pretouch.cli.run.command import Run
 from pretouch.cli.run.setup import run_setup
 from pretouch.recording.disk import Disk
@@ -85,7 +85,7 @@ def test_without_the_name_of_an_arm_a_simulated_one_is_rehearsed(words, monkeypa
     commands = []
     monkeypatch.setattr(Run, "run", lambda command: commands.append(command))
     assert cli.main(["run", *words]) == 0
-    assert commands == [Run(Simulated())]
+    assert commands == [Run(TaskOptions(), Simulated(), RobotOptions(), SkinOptions(), ProcessOptions())]
 
 
 def test_an_arm_of_a_distribution_that_is_not_installed_is_a_sentence(monkeypatch, capsys):

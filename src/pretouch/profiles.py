@@ -110,12 +110,8 @@ PROFILES: dict[str, Profile] = {
         ),
     ),
 }
-"""`paper`: the equations and Table I. `blind`: the same without proximity, eqs. 8-10 with F_obs = 0.
-`slowing-only` and `thresholds-only`: the paper's ablations, one use of proximity each (restrictions are apart from
-both). `paper-0.5m`: in place of Table I's distances the 0.5 m within which obstacles affect the arm by the paper's
-text (section V-C). `pretouch`: ours, each departure from the paper one switch (docs/explanation/detection.md,
+"""Each departure of `pretouch` from the paper is one switch (docs/explanation/detection.md,
 docs/explanation/anticipation.md, docs/explanation/reaction.md)."""
-
 
 SHORT = {
     "paper-off": "paper:approach=none",

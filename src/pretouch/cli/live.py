@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Literal
 
-from pretouch.cli.options import Numbers, OptionalFile, UnitOptions
+from pretouch.cli.options import Numbers, OptionalFile, ProfileText, UnitOptions
 from pretouch.cli.warm_up import prepare
 from pretouch.extras import LIVE
 from pretouch.page.real_units import RealUnits
@@ -28,8 +28,7 @@ from pretouch.units.skin import NetworkSkin
 class Live:
     """Watch the simulated arm in a browser and touch it: a page with the arm, your hand, plots and all parameters."""
 
-    profile: str = "pretouch"
-    """Profile to start with, or PROFILE:GROUP.FIELD=VALUE."""
+    profile: ProfileText = "pretouch"
     arm: str = "panda"
     """panda, fr3, or the folder of an imported arm, to which the room is scaled."""
     gravity: Numbers = ()

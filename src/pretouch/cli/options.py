@@ -10,6 +10,7 @@ from tyro.constructors import PrimitiveConstructorSpec
 
 from pretouch.arms import DEFAULT, ArmOptions
 from pretouch.errors import HardwareError
+from pretouch.params import OFFERED
 from pretouch.units import HOST, PORT
 
 A = TypeVar("A", bound=ArmOptions)
@@ -51,6 +52,20 @@ def _listed(info: tyro.constructors.PrimitiveTypeInfo) -> PrimitiveConstructorSp
     )
 
 
+@REGISTRY.primitive_rule
+def _optional(info: tyro.constructors.PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
+    kind, *rest = get_args(info.type) or (None,)
+    if kind not in (int, float) or rest != [type(None)]:
+        return None
+    return PrimitiveConstructorSpec(
+        nargs=1,
+        metavar=kind.__name__.upper(),
+        instance_from_str=lambda words: kind(words[0]),
+        is_instance=lambda value: value is None or isinstance(value, kind),
+        str_from_instance=lambda value: [str(value)],
+    )
+
+
 OptionalFile = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
 """A file, or none."""
 JsonFile = Annotated[
@@ -60,6 +75,10 @@ JsonFile = Annotated[
     ),
 ]
 """Where a command writes its numbers; see `writing.numbers_to`."""
+
+
+ProfileText = Annotated[str, tyro.conf.arg(metavar="NAME", help=f"{OFFERED} Or NAME:GROUP.FIELD=VALUE.")]
+"""A profile by its name, with changes."""
 
 
 def split_arm(words: Sequence[str]) -> tuple[str, Sequence[str]]:
@@ -113,17 +132,33 @@ class SkinOptions(UnitOptions):
 
 
 @dataclass(frozen=True)
+class ProcessOptions:
+    """Files of the run, and how its process runs."""
+
+    record: OptionalFile = None
+    """Recording to write."""
+    json: JsonFile = None
+    holds: str = "runs/holds"
+    """Folder for the last seconds before a HOLD that lasts until a person resumes."""
+    priority: int | None = None
+    """Real-time priority of the control loop, 1 to 99; by default the process keeps its own."""
+    cpu: int | None = None
+    """Processor to run on; by default the system decides."""
+    yes: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Do not ask before the arm moves."""
+
+
+@dataclass(frozen=True)
 class TaskOptions:
     """Task of the arm."""
 
     path: Literal["circle", "line", "hold"] = "circle"
     """circle and line: the paper's paths, started at the nearest point. hold: stay in place, and yield when touched."""
-    center: tuple[float, float, float] | None = None
-    """Centre of the circle [m], base frame; by default 0.5 0 0.25, for an imported arm where it reaches."""
+    center: Numbers = ()
+    """Centre of the circle [m], base frame; by default 0.5,0,0.25, for an imported arm where it reaches."""
     radius: float | None = None
     """Radius of the circle [m]; by default 0.25, for an imported arm scaled by its reach."""
-    profile: str = "pretouch"
-    """Parameters of the controller, or PROFILE:GROUP.FIELD=VALUE."""
+    profile: ProfileText = "pretouch"
     seconds: float = 0.0
     """Duration [s]; 0: until it is stopped."""
     approach: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from pretouch.arms import ArmSetup, OpenedArm, arm_class
 from pretouch.calibration.motion.plan import Plan
-from pretouch.cli.options import A, JsonFile, OptionalFile, RobotOptions, SkinOptions, TaskOptions, split_arm
+from pretouch.cli.options import A, ProcessOptions, RobotOptions, SkinOptions, TaskOptions, split_arm
 from pretouch.cli.run.setup import free_motion, heard_units, run_setup
 from pretouch.cli.warm_up import prepare
 from pretouch.cli.writing import check_writable, numbers_to
@@ -35,21 +35,11 @@ class Run(Generic[A]):
     The exit code is 1 if the run ended early or its recording failed, 2 if it was refused before anything moved.
     """
 
+    task: TaskOptions
     connection: A
-    robot: RobotOptions = field(default_factory=RobotOptions)
-    units: SkinOptions = field(default_factory=SkinOptions)
-    task: TaskOptions = field(default_factory=TaskOptions)
-    record: OptionalFile = None
-    """Recording to write."""
-    json: JsonFile = None
-    holds: str = "runs/holds"
-    """Folder for the last seconds before a HOLD that lasts until a person resumes."""
-    priority: int | None = None
-    """Real-time priority of the control loop, 1 to 99; by default the process keeps its own."""
-    cpu: int | None = None
-    """Processor to run on; by default the system decides."""
-    yes: bool = False
-    """Do not ask before the arm moves."""
+    robot: RobotOptions
+    units: SkinOptions
+    process: ProcessOptions
 
     @staticmethod
     def of_words(words: Sequence[str]) -> tuple[Any, Sequence[str], str]:
@@ -60,7 +50,7 @@ class Run(Generic[A]):
     def run(self) -> int | None:
         """Move the arm. Where a signal ended the run in order, its code is the exit code."""
         check_options(self)
-        with numbers_to(self.json) as write:
+        with numbers_to(self.process.json) as write:
             return _run(self, write) or None
 
 
@@ -79,11 +69,12 @@ def check_options(command: Run[Any]) -> None:
 
 def _run(command: Run[Any], write: Callable[[Any], None]) -> int:
     """Move an arm, and write its numbers; return 1 if the run ended early or its recording failed, or else 0."""
-    check_wishes(command.priority, command.cpu)
-    if command.record:
-        if command.record.exists():
-            raise RecordingError(f"{command.record} exists already: give another file to --record.")
-        check_writable("recording", command.record)
+    process = command.process
+    check_wishes(process.priority, process.cpu)
+    if process.record:
+        if process.record.exists():
+            raise RecordingError(f"{process.record} exists already: give another file to --record.")
+        check_writable("recording", process.record)
     setup = run_setup(command.connection, command.robot, command.units, command.task)
     connection = ArmSetup(
         name=command.robot.arm,
@@ -93,8 +84,8 @@ def _run(command: Run[Any], write: Callable[[Any], None]) -> int:
         profile=setup.profile,
         start=setup.simulated_start,
         floor=setup.floor,
-        priority=command.priority,
-        yes=command.yes,
+        priority=process.priority,
+        yes=process.yes,
     )
     command.connection.check(connection)
     for sentence in setup.assumed:
@@ -160,7 +151,7 @@ def _allowed_way(command: Run[Any], standing: StandingArm, opened: OpenedArm, re
     way = plan_to_start(c.model, q, c.path, standing.floor) if standing.approach else None
     for sentence in announcement(c, command.task.seconds or np.inf, way, opened.announced):
         say(sentence)
-    if not command.yes:
+    if not command.process.yes:
         require_yes("Go on?", "The arm was not moved")
     standing.recheck(rest)
     return way
@@ -186,15 +177,15 @@ def _executed(
     with ExitStack() as stack:
         tell = stack.enter_context(BackgroundPrinter(say))
         output = stack.enter_context(opened.output(controller))
-        opening = RunFiles(standing, command.record, Path(command.holds), tell, learnt, output)
+        opening = RunFiles(standing, command.process.record, Path(command.process.holds), tell, learnt, output)
         files = stack.enter_context(opening)
         reporter = ProgressReporter(files, tell, latched, controller)
         options = RealTimeOptions(
             enter,
             learnt.begin if learnt else None,
             desired=opened.commander or (lambda: None),
-            priority=command.priority,
-            cpu=command.cpu,
+            priority=command.process.priority,
+            cpu=command.process.cpu,
             tell=tell,
         )
         try:

@@ -62,7 +62,7 @@ class RunSetup:
         here = self.model.kinematics(q).position[self.model.ee]
         if self.task.path == "circle":
             usual = cast(Circle, self.placement.path("circle", 1.0))
-            center = usual.center if self.task.center is None else self.task.center
+            center = self.task.center or usual.center
             y, z = here[1:] - center[1:]
             radius = usual.radius if self.task.radius is None else self.task.radius
             return Circle(center, radius, float(np.arctan2(z, y)))
@@ -90,7 +90,9 @@ def run_setup(arm: ArmOptions, robot: RobotOptions, units: SkinOptions, task: Ta
     floor = (SceneSpec().floor_height if arm.simulated else 0.0) if task.floor is None else task.floor
     if not np.isfinite(floor):
         raise ParameterError(f"--floor is {floor}: give a height in metres.")
-    circle = task.path == "circle" and (task.center is None or task.radius is None)
+    if len(task.center) not in (0, 3) or not np.isfinite(task.center).all():
+        raise ParameterError(f"--center has {len(task.center)} numbers: give x,y,z in metres, as 0.5,0,0.4.")
+    circle = task.path == "circle" and not (task.center and task.radius is not None)
     placement = placement_for(model) if circle or task.path == "line" else Placement()
     assumed = assumptions(model, placement)
     if not arm.simulated:  # a real arm is what it is, wherever its path is
