@@ -69,9 +69,9 @@ def test_an_arm_that_nothing_limits_says_its_speed_or_place_and_what_it_sees(ste
 
 def test_an_arm_too_loud_for_a_light_push_says_what_it_finds(step: ControlStep) -> None:
     assert finds(step) == ""
-    assert finds(replace(step, detectable_n=14.9)) == "finds 15 N"
-    assert finds(replace(step, detectable_n=28.4)) == "here, at this speed, a push is found from 28 N on"
-    assert finds(replace(step, detectable_n=np.inf)) == "here, at this speed, no push is found"
+    assert finds(replace(step, detectable_n=14.9)) == "detects pushes from 15 N on"
+    assert finds(replace(step, detectable_n=28.4)) == "at this speed, detects pushes from 28 N on only"
+    assert finds(replace(step, detectable_n=np.inf)) == "at this speed, detects no push"
 
 
 def test_eq_3_is_said_with_its_factor_and_the_unit_nearest_to_the_end_effector(step: ControlStep) -> None:
@@ -130,9 +130,13 @@ def test_an_arm_kept_off_its_path_says_by_what_and_how_far_and_never_that_it_fol
         Doing.WAITING,
         "Waiting 0.12 m from its path: hand_left sees something at 0.06 m. It continues when the way is clear.",
     )
-    assert said(step, path_position=off["path_position"]) == Explanation(
+    back = AHEAD + np.array([0.0, 0.0, 0.2])
+    assert said(step, path_position=off["path_position"], desired_velocity=back) == Explanation(
         Doing.RETURNING, "Returning to its path, 0.12 m away."
     )
+    # 12 mm behind, as an arm that lags, and corrected by 1.5 times that a second: it follows
+    behind, correction = step.ee_position + np.array([0.0, 0.0, 0.012]), AHEAD + np.array([0.0, 0.0, 0.018])
+    assert said(step, path_position=behind, desired_velocity=correction).doing is Doing.MOVING
     slow = said(step, **off, speed_scale=0.4)
     assert (
         slow.sentence == "Slowed to 40 % on its way back to the path, 0.12 m away: hand_left sees something at 0.06 m."

@@ -21,6 +21,8 @@ ASKED_M_S = 0.005
 """Speed from which a motion is desired [m/s]."""
 _PRESSED = 1e-9
 """Multiplier above which a limit is active."""
+_TOWARDS = 0.25
+"""Least cosine between the desired velocity and the way back for an arm that returns to its path."""
 OFF_PATH_M = 0.01
 """Distance from the path at which the arm is off it [m]; an arm that follows the path stays closer."""
 _REST_M_S = 0.02
@@ -164,13 +166,13 @@ def _allowed(step: "ControlStep", links: Sequence[str], velocity: FloatArray, al
 
 
 def finds(step: "ControlStep") -> str:
-    """Say which push the detector finds; '' where it does not tell."""
+    """Say which push the detector detects; '' where it does not tell."""
     if np.isnan(step.detectable_n):
         return ""
     if step.detectable_n <= LOUD_N:
-        return f"finds {step.detectable_n:.0f} N"
-    loud = "no push is found" if np.isinf(step.detectable_n) else f"a push is found from {step.detectable_n:.0f} N on"
-    return f"here, at this speed, {loud}"
+        return f"detects pushes from {step.detectable_n:.0f} N on"
+    loud = "no push" if np.isinf(step.detectable_n) else f"pushes from {step.detectable_n:.0f} N on only"
+    return f"at this speed, detects {loud}"
 
 
 def resumable(step: "ControlStep") -> bool:
@@ -207,7 +209,9 @@ def _on_the_way(step: "ControlStep", units: Sequence[str], links: Sequence[str])
     speed = float(np.linalg.norm(step.ee_velocity))
     restricted = limited.by is Limit.APPROACH
     if not (restricted or limited.by is Limit.SLOWED):
-        if off >= OFF_PATH_M:
+        back = float((step.path_position - step.ee_position) @ step.desired_velocity)
+        # an arm that lags behind as it follows its path moves along it, not towards it
+        if off >= OFF_PATH_M and back >= _TOWARDS * off * float(np.linalg.norm(step.desired_velocity)):
             return Explanation(Doing.RETURNING, f"Returning to its path, {off:.2f} m away.")
         near = step.obstacles.body_distance
         nothing = "nothing near is seen" if len(units) else "no sensor unit is in use"

@@ -145,8 +145,8 @@ TABLE: tuple[Transition, ...] = (
         Event.WINDOW_FILLING,
         _ANY,
         Mode.HOLD,
-        "The force window is filling ({}): contacts cannot be distinguished from noise yet. The arm moves"
-        " once it is full.",
+        "Measuring the arm's torques ({}): contacts cannot be distinguished from noise yet. The arm moves once that"
+        " is done.",
     ),
     Transition(Event.CLEAR, _ANY, Mode.TRACK, "Moving as requested."),
 )

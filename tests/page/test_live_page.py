@@ -182,7 +182,7 @@ def test_a_push_is_felt_or_the_page_says_what_it_lacked(clock, simulation):
     clock.page.actions.put(lambda: simulation.move_hand(np.array([1.4, 0.0, 1.2])))
     clock.turn(1.5)  # the force window is full
     give(clock.page, "Force [N]", 60.0)
-    click(clock.page, "Push the hand")
+    click(clock.page, "Push the robot's hand")
     clock.turn(1.6)
     assert clock.page.status.notice.startswith("The push of 60 N was detected after 0.")
     assert clock.page.status.notice.endswith("and the arm moved with it.")
@@ -191,7 +191,7 @@ def test_a_push_is_felt_or_the_page_says_what_it_lacked(clock, simulation):
     assert simulation.frame.step.mode is Mode.TRACK
     give(clock.page, "Force [N]", 5.0)
     give(clock.page, "Duration [s]", 0.3)
-    click(clock.page, "Push the hand")
+    click(clock.page, "Push the robot's hand")
     clock.turn(0.8)
     assert clock.page.status.notice.startswith("The push of 5 N was not detected: the filtered force came to ")
     assert clock.page.status.notice.endswith(" N would have been a contact then.")

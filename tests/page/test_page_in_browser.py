@@ -104,7 +104,7 @@ def test_the_page_shows_word_and_sentence_of_the_step_and_the_panel_covers_no_sc
         scene, panel = visitor.box("canvas"), visitor.box("#status")
         assert scene["y"] + scene["height"] <= panel["y"] or scene["x"] + scene["width"] <= panel["x"]
         assert scene["width"] * scene["height"] > 0.5 * width * height
-        for label in ("Push the hand", "Go on", "Reset", "Record"):
+        for label in ("Push the robot's hand", "Go on", "Reset", "Record"):
             button = visitor.page.get_by_role("button", name=label, exact=True).bounding_box()
             assert button["x"] >= 0
             assert button["x"] + button["width"] <= width

@@ -68,7 +68,7 @@ def test_a_unit_silent_for_longer_than_the_profile_allows_is_red_and_its_cone_to
     nodes = drawn(replace(some_step, range_distance=np.full(7, 0.5)), age=age)
     for part in (UNITS, CONES):
         assert [np.array_equal(colour, red) for colour in nodes[part].batched_colors] == [False, True, False, False]
-    assert nodes[CONES].batched_scales[1] < 0.2  # what it read last says nothing
+    assert nodes[CONES].batched_scales[1] < 0.1  # what it read last says nothing
     nodes = drawn(some_step, 0.1)  # ages are not known
     assert not np.any(np.all(nodes[UNITS].batched_colors == red, axis=1))
 
@@ -106,7 +106,7 @@ def test_remembered_places_fade_and_the_units_glow_that_see_them_now(drawn, some
     drawn(some_step, 0.1, places=places._replace(stamp=np.full(4, some_step.stamp), unit=np.full(4, -1)))
     assert not np.any(nodes[UNITS].batched_colors == palette.as_vertex(palette.SEEING))
     nodes = drawn(replace(some_step, range_distance=np.full(7, 0.3)), 0.2, places=places)
-    assert np.flatnonzero(nodes[CONES].batched_scales > 0.2).tolist() == [2]
+    assert np.flatnonzero(nodes[CONES].batched_scales > 0.1).tolist() == [2]
     glows = np.all(nodes[UNITS].batched_colors == palette.as_vertex(palette.SEEING), axis=1)
     assert np.flatnonzero(glows).tolist() == [2]
 

@@ -34,7 +34,7 @@ def test_each_change_is_told_once_and_all_is_handed_on(watched):
     assert [sentence.split()[0] for sentence in told] == ["HOLD", "TRACK"]
     assert len(cycles) == reporter.summary.steps == 150
     (held,) = reporter.summary.holds.items()
-    assert held[0].startswith("The force window is filling")
+    assert held[0].startswith("Measuring the arm's torques")
     assert held[1] == pytest.approx(1.0, abs=0.02)
 
 
@@ -142,8 +142,8 @@ def test_a_push_that_a_test_of_the_torques_misses_says_the_evidence(step: Contro
 
 
 def test_a_push_of_an_arm_that_holds_says_why_it_holds(step: ControlStep) -> None:
-    said = outcome(step, all={"mode": Mode.HOLD, "reason": "The force window is filling.", "evidence": 0.0})
-    assert said == "The push of 15 N was not detected: the arm held (The force window is filling)."
+    said = outcome(step, all={"mode": Mode.HOLD, "reason": "Measuring the arm's torques.", "evidence": 0.0})
+    assert said == "The push of 15 N was not detected: the arm held (Measuring the arm's torques)."
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from pretouch.errors import RecordingError
 from pretouch.page.panel import SETTLE_S, ActionQueue, add_button, add_view_boxes, put, when_changed
 from pretouch.page.room import ObjectName, PathName
 from pretouch.page.simulation import LiveSimulation
-from pretouch.params import TaskParams
+from pretouch.params import OFFERED, TaskParams
 from pretouch.profiles import Profile, profile, profile_names
 from pretouch.sim.tcp_push import AXES
 
@@ -62,8 +62,8 @@ class Controls:
         """The field for a profile's text, once it is there."""
         self._written = ""
         """The profile that the field shows, or showed before somebody typed."""
-        self._button("Push the hand", self._push, icon="HAND_FINGER", hint="With the force of the folder Push.")
-        names = gui.add_dropdown("Profile", _NAMES)
+        self._button("Push the robot's hand", self._push, icon="HAND_FINGER", hint="With the force of the folder Push.")
+        names = gui.add_dropdown("Profile", _NAMES, hint=OFFERED)
         self._setting(names, self._choose_profile, "profile", lambda: self._base)
         self._pause = self._button("Pause", self._toggle_pause, icon="PLAYER_PAUSE", color="gray")
         hint = "Leave a hold that waits for you."

@@ -18,6 +18,7 @@ from pretouch.page.simulation import LiveSimulation
 from pretouch.types import FloatArray
 
 _ARMS = ("one arm", "three arms")
+_INVITATION = "Drag the hand into the arm's way"
 
 
 class LivePage:
@@ -34,18 +35,23 @@ class LivePage:
         self.pace, self.actions = Pace(), ActionQueue()
         self._visited = False
         """True if anybody has opened the page: an opening waits until then."""
-        self._companions: Companions | None = None
+        self._untouched = simulation.opening is not None
+        """True until somebody drags or clicks: the opening, of three arms, repeats."""
+        self._companions = Companions(server, simulation) if self._untouched else None
         """Arms beside the page's own; None: it is alone."""
         self._receiver_ended = False
         """True if the receiver of the real units has ended."""
         style_page(server)
         self.status = Status(server.gui)
         if not simulation.real:
-            arms = server.gui.add_dropdown("Arms", _ARMS, hint="Three: blind, paper and pretouch with one hand.")
+            hint = "Three: blind, paper and pretouch with one hand."
+            arms = server.gui.add_dropdown("Arms", _ARMS, initial_value=_ARMS[self._untouched], hint=hint)
             when_changed(arms, self.actions, self._show_arms, "arms")
         self.controls = Controls(server.gui, simulation, self.actions)
         self.drive = Drive(server, simulation, self.actions)
         self._scene = Scene(server, simulation.world, on_drag=self._drag)
+        if self._untouched:
+            self._scene.invite(_INVITATION)
         self.status.notice = f"{self._scene.notice} {simulation.notice}".strip()
         simulation.notice = ""
         self._history = History()
@@ -75,6 +81,9 @@ class LivePage:
         self._visited = self._visited or bool(self._server.get_clients())
         if simulation.opening and not self._visited:
             return
+        if self._untouched and not simulation.opening:
+            simulation.play_opening()
+            self._begin_again()
         recording, before = simulation.recording, simulation.time
         self.drive.turn()
         steps = [] if running.paused else simulation.advance(running.speed * PERIOD_S)
@@ -103,6 +112,8 @@ class LivePage:
         simulation, actions = self._simulation, self.actions.take(now)
         if actions:
             simulation.opening = None  # from the first drag or click on, the page is the visitor's
+            self._untouched = False
+            self._scene.invite("")
         for action in actions:
             if not action.quiet:
                 self.status.notice = ""
@@ -113,15 +124,19 @@ class LivePage:
         if actions:
             self.controls.refresh()
         if simulation.time < self._time:
-            if self._companions:
-                self._companions.begin()
-            self._scene.trail.clear()
-            self._history.clear()
-            self.drive.steering.goal = None
+            self._begin_again()
         self._time = simulation.time
         if simulation.world is not self._world:
             self._world = simulation.world
             self._scene.show_world(self._world)
+
+    def _begin_again(self) -> None:
+        """Forget what was drawn before time 0."""
+        if self._companions:
+            self._companions.begin()
+        self._scene.trail.clear()
+        self._history.clear()
+        self.drive.steering.goal = None
 
     def _draw(self, now: float) -> None:
         frame, pace, recording = self._simulation.frame, self.pace, self._simulation.recording
@@ -133,10 +148,9 @@ class LivePage:
                 self._companions.draw(now)
             self._plots.draw(now)
             explanation = explain(step, world.units_in_use, world.model.links, motion.velocities if motion else None)
-            rates = f"{pace.factor:.2f} × real time · {pace.updates:.0f} updates/s"
-            rates = "paused" if self.controls.running.paused else rates
+            paused = "paused" if self.controls.running.paused else ""
             recorded = f"recording {recording.place.name}" if recording else ""
-            line = " · ".join(filter(None, (f"{step.stamp:.1f} s", rates, finds(step), recorded)))
+            line = " · ".join(filter(None, (f"{step.stamp:.0f} s", paused, finds(step), recorded)))
             self.status.draw(step.mode, explanation, line, pace.sentence(), now)
             self.controls.offer_resume(resumable(step))
 

@@ -74,6 +74,8 @@ def css(colour: Colour) -> str:
 def legend() -> str:
     """Legend of the colours in space, as HTML."""
     marks = "".join(_mark(name, css(colour), 14, 4, 2) for name, colour in _LINES.items())
+    marks += _mark("cone of a unit that sees something", css(SEEING), 8, 8, 1)
+    marks += _mark("distance to the nearest unit", css(FOLLOWING), 14, 1, 0)
     marks += _mark("closest pair", css(PAIR), 14, 2, 0) + _mark("silent unit", css(UNIT_SILENT), 8, 8, 1)
     for name, colours in {"sensed, and remembered": REMEMBERED, "contact expected": EXPECTED}.items():
         marks += _mark(name, f"linear-gradient(90deg,{','.join(map(css, colours))})", 46, 8, 4)

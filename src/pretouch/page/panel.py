@@ -103,22 +103,22 @@ class Pace:
     def __init__(self) -> None:
         self.slow = False
         """True if the machine was too slow for two seconds, and has not kept up for one since."""
-        self.factor = self.updates = 0.0
-        """Simulated over real time, and updates a second, of the last window."""
+        self.factor = 0.0
+        """Simulated over real time, of the last window."""
         self._shares = (1.0, 1.0)
-        self._begin, self._updates, self._simulated = -math.inf, 0, 0.0
+        self._begin, self._simulated = -math.inf, 0.0
 
     def tick(self, now: float, advanced: float, speed: float) -> None:
         """Count an update at a time [s] before which the simulation advanced [s], as it should at a speed."""
         if math.isinf(self._begin):
             self._begin = now
             return
-        self._updates, self._simulated, lasted = self._updates + 1, self._simulated + advanced, now - self._begin
+        self._simulated, lasted = self._simulated + advanced, now - self._begin
         if lasted >= 1.0:
-            self.factor, self.updates = self._simulated / lasted, self._updates / lasted
+            self.factor = self._simulated / lasted
             self._shares = (self._shares[1], self.factor / speed)
             self.slow = max(self._shares) < (0.97 if self.slow else 0.9)
-            self._begin, self._updates, self._simulated = now, 0, 0.0
+            self._begin, self._simulated = now, 0.0
 
     def sentence(self) -> str:
         """Say that the machine is too slow, or nothing."""

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from viser import SceneApi
+from viser import LabelHandle, SceneApi
 
 from pretouch.page import palette
 from pretouch.page.arm import SHADELESS
@@ -64,15 +64,32 @@ def _capsules(segments: list[tuple[tuple[float, float, float], tuple[float, floa
 class PersonHand:
     """A fist where the simulated hand is, and a faint one where it is to be while that is elsewhere."""
 
-    def __init__(self, scene: SceneApi, radius: float, root: str = "", on_drag: Drag | None = None) -> None:
-        """Add it under a node; `on_drag` is called from the page's own thread. A drag of it never moves the camera."""
+    def __init__(
+        self, scene: SceneApi, radius: float, floor: float, root: str = "", on_drag: Drag | None = None
+    ) -> None:
+        """Add it under a node, with a shadow on the floor at a height [m].
+
+        `on_drag` is called from the page's own thread. A drag of it never moves the camera.
+        """
+        self._scene, self._root, self._floor = scene, root, floor
+        look: dict[str, Any] = {"color": palette.FOLLOWING, "opacity": 0.3, "visible": False}
+        self._shadow = scene.add_cylinder(f"{root}/shadow", radius, 0.002, **look, **SHADELESS)
+        self._gap = scene.add_line_segments(
+            f"{root}/gap",
+            np.zeros((1, 2, 3)),
+            palette.FOLLOWING,
+            thickness=1.5,
+            thickness_units="screen",
+            visible=False,
+        )
+        self._invitation: LabelHandle | None = None
         self._hand = scene.add_frame(f"{root}/hand", show_axes=False)
         self._target = scene.add_frame(f"{root}/hand_target", show_axes=False, visible=False)
         for part, mesh, colour in (("fist", fist(radius), palette.HAND), ("cuff", cuff(radius), palette.CUFF)):
             for name, opacity in ((f"{root}/hand/{part}", None), (f"{root}/hand_target/{part}", 0.3)):
                 scene.add_mesh_simple(name, mesh.vertices, mesh.faces, color=colour, opacity=opacity, **SHADELESS)
         # barely there, and as lines, so that it hides nothing behind it
-        look: dict[str, Any] = {"color": palette.HAND, "opacity": 0.01, "wireframe": True, "subdivisions": 2}
+        look = {"color": palette.HAND, "opacity": 0.01, "wireframe": True, "subdivisions": 2}
         grip = scene.add_icosphere(f"{root}/hand/grip", GRIP * radius, **look, **SHADELESS)
         self._position = self._offset = np.zeros(3)
         if on_drag:
@@ -83,9 +100,25 @@ class PersonHand:
                     self._offset = self._position - np.array(event.start_position)
                 on_drag(np.array(event.client.camera.position), np.array(event.end_position) + self._offset)
 
-    def draw(self, hand: FloatArray | None, target: FloatArray | None) -> None:
-        """Show hand and target (3,) [m]; None and what is not finite are not shown."""
+    def invite(self, sentence: str) -> None:
+        """Write a sentence beside the hand, or nothing."""
+        if self._invitation:
+            self._invitation.remove()
+        name = f"{self._root}/hand/invitation"
+        self._invitation = self._scene.add_label(name, sentence, position=(0.0, 0.0, 0.1)) if sentence else None
+
+    def draw(self, hand: FloatArray | None, target: FloatArray | None, units: FloatArray) -> None:
+        """Show hand and target (3,) [m]; None and what is not finite are not shown.
+
+        The hand's shadow, and a line to the nearest of the units (N, 3) [m], show how far away it is.
+        """
         hand = hand if hand is not None and np.isfinite(hand).all() else None
+        self._shadow.visible, self._gap.visible = hand is not None, hand is not None and len(units) > 0
+        if hand is not None:
+            self._shadow.position = np.array([hand[0], hand[1], self._floor])
+        if hand is not None and len(units):
+            nearest = units[np.linalg.norm(units - hand, axis=1).argmin()]
+            self._gap.points = np.array([[hand, nearest]], dtype=np.float32)
         near = hand is None or target is None or np.linalg.norm(target - hand) <= _APART_M
         for node, place in ((self._hand, hand), (self._target, None if near else target)):
             node.visible = place is not None

@@ -70,7 +70,7 @@ class Plots:
 
     def __init__(self, gui: GuiApi, history: History) -> None:
         self._gui, self._history, self._sent = gui, history, -np.inf
-        self._caption("Touch", [("a contact from 1 on", _FORCE)])
+        self._caption("Touch", [("contact at 1", _FORCE)])
         self._evidence = self._plot([_FORCE, _GREY], 1.5)
         self._caption("Nearest [m]", [("from the arm to what is seen or remembered", _SENSED)])
         self._nearest = self._plot([_SENSED], 1.0)

@@ -9,6 +9,7 @@ from itertools import islice
 
 import numpy as np
 from viser import GuiApi, ViserServer
+from viser._messages import GuiSliderMark  # of the version that pyproject.toml pins
 
 from pretouch.explanation import answers, explain, finds
 from pretouch.loop import MonotonicClock
@@ -70,6 +71,10 @@ class Player:
     def index_at(self, time: float) -> int:
         """Return the newest step at a time since the first [s], or the first."""
         return max(0, bisect_right(self._times, time + 1e-9) - 1)
+
+    def time_of(self, index: int) -> float:
+        """Return the time of a step since the first [s]."""
+        return self._times[index]
 
     def advance(self, elapsed: float) -> None:
         """Advance by real time [s]; it stops at the end."""
@@ -208,8 +213,16 @@ class ReplayPage:
         end = time.perf_counter() + (_SEARCH_PLAYING_S if self.player.playing else _SEARCH_S)
         while self.timeline.share < 1.0 and time.perf_counter() < end:
             self.timeline.search(_AT_ONCE)
+            if self.timeline.share == 1.0:
+                self._mark_events()
         if self._server.get_clients():
             self.draw(now)
+
+    def _mark_events(self) -> None:
+        """Put a tick on the slider for each event."""
+        times = {self.player.time_of(event.index) for event in self.timeline.events}
+        # viser takes marks at the slider's creation only, when the events are not found yet
+        setattr(self._slider, "_marks", tuple(GuiSliderMark(time, None) for time in sorted(times)))  # noqa: B010
 
     def draw(self, now: float) -> Kept:
         """Draw the step at the player's time, and return it."""

@@ -75,11 +75,18 @@ class Scene:
         self._touched = scene.add_frame(f"{root}/touched", show_axes=False)
         self._true_force = self._arrow(f"{root}/touched/true_force", palette.TRUE_FORCE)
         self._place = self._arrow(f"{root}/place", palette.PLACE)
-        self._hand = None if world.hand_radius is None else PersonHand(scene, world.hand_radius, root, on_drag)
+        self._hand = None
+        if world.hand_radius is not None:
+            self._hand = PersonHand(scene, world.hand_radius, world.floor_height, root, on_drag)
 
     def _arrow(self, name: str, colour: palette.Colour, radius: float = 0.007) -> ArrowsHandle:
         shape: dict[str, Any] = {"shaft_radius": radius, "head_radius": 2.5 * radius, "head_length": 0.04}
         return self._scene.add_arrows(name, np.zeros((1, 2, 3)), colour, **shape, visible=False)
+
+    def invite(self, sentence: str) -> None:
+        """Write a sentence at the person's hand, or nothing."""
+        if self._hand:
+            self._hand.invite(sentence)
 
     def remove(self) -> None:
         """Take a world that has a root out of the page."""
@@ -132,7 +139,7 @@ class Scene:
         self._draw_pairs(step)
         self._draw_forces(frame, kin.position[world.model.ee])
         if self._hand:
-            self._hand.draw(frame.hand, frame.hand_target)
+            self._hand.draw(frame.hand, frame.hand_target, self.units.places(kin))
         motion = driven_motion(frame, world, kin)
         self._draw_motion(motion)
         return motion

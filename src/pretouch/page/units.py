@@ -19,6 +19,8 @@ from pretouch.types import BoolArray, FloatArray, IntArray
 
 _IDLE_M = 0.06
 """Length at which a cone is drawn that shows nothing [m]."""
+_NEAR_M, _SHORTER = 0.3, 0.4
+"""Length of a cone with a target that is near [m], and how much shorter it is with the target's distance."""
 _FAINT, _CLEAR = 0.2, 0.7
 _UNIT_M = (0.020, 0.014, 0.004)
 _POINT_M = 0.012
@@ -35,6 +37,7 @@ class Units:
         self._scene, self._skin = scene, skin
         self._plates: list[tuple[IntArray, BatchedMeshHandle]] = []
         self._cones: list[tuple[IntArray, BatchedMeshHandle]] = []
+        self._cones_shown = True
         plate = trimesh.creation.box(_UNIT_M)
         boards, poses = skin.first, np.array([unit.T_link_sensor for unit in skin.mounted])
         for link in np.unique(skin.link):
@@ -72,8 +75,11 @@ class Units:
 
     def show_cones(self, visible: bool) -> None:
         """Show or hide the fields of view."""
-        for _, cones in self._cones:
-            cones.visible = visible
+        self._cones_shown = visible
+
+    def places(self, kin: Kinematics) -> FloatArray:
+        """Return where the units are (N, 3) [m], base frame."""
+        return placed_sensors(self._skin.arrays, kin)[0][self._skin.first]
 
     def draw(self, frame: Frame, kin: Kinematics, silent: BoolArray, perceiving: bool) -> None:
         """Show what the units see, and which of them (K,) are silent.
@@ -94,14 +100,16 @@ class Units:
         cones = _coloured(marks, palette.CONE)
         # of zones, what any of them says
         plates = _coloured([np.logical_or.reduceat(mark, self._skin.first) for mark in marks], palette.UNIT)
-        # a beam is drawn up to what it shows, so far it is empty; one that shows the floor or the arm is not drawn
-        lengths = np.where(seeing, np.round(reading, 2), _IDLE_M).astype(np.float32)
+        # a cone ends at what it shows or before, the shorter the farther that is; the floor and the arm show nothing
+        far = np.maximum(_IDLE_M, _NEAR_M - _SHORTER * reading)
+        lengths = np.where(seeing, np.round(np.minimum(reading, far), 2), _IDLE_M).astype(np.float32)
         opacities = np.where(seeing, _CLEAR, _FAINT).astype(np.float32)
         for boards, handle in self._plates:
             handle.batched_colors = plates[boards]
         for units, handle in self._cones:
             handle.batched_colors, handle.batched_scales = cones[units], lengths[units]
             handle.batched_opacities = opacities[units]
+            handle.visible = self._cones_shown and perceiving
         self.points.points = points.astype(np.float16)
         self.points.colors = np.rint(palette.between(palette.REMEMBERED, age / _FADED_S)).astype(np.uint8)
 
