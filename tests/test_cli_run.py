@@ -124,7 +124,7 @@ def test_a_rehearsal_checks_confirms_announces_goes_to_its_path_moves_and_report
     assert cli.main(["run", *words, "--record", "a.mcap"]) == 0
     said = capsys.readouterr().out
     order = [
-        "All checks passed", "Push the hand gently", "towards +y", "towards +x", "towards +z",
+        "All checks passed", "A simulated person pushes the hand", "towards +y", "towards +x", "towards +z",
         "The force sign is confirmed", "First the arm moves slowly", "To stop it", "HOLD", "The arm is at rest.",
         "a.mcap holds",
     ]  # fmt: skip

@@ -5,12 +5,10 @@ import math
 import numpy as np
 import pytest
 import trimesh
-from tests.needs import skip_without
+from tools.surfaces import coarse
 
-from pretouch.extras import MESHES
-from pretouch.page import surfaces
 from pretouch.page.person import cuff, fist
-from pretouch.page.surfaces import EDGE_M, capsule_surfaces, coarse, surface_of, vendor_surfaces
+from pretouch.page.surfaces import EDGE_M, capsule_surfaces, surface_of, vendor_surfaces
 from pretouch.robot.body import Capsules, from_axes
 from pretouch.sim.scene import HandSpec
 
@@ -59,15 +57,13 @@ def test_a_coarse_mesh_has_few_vertices_near_the_fine_one_looks_outwards_and_has
     assert len(np.unique(corners, axis=0)) == len(corners)
 
 
-def test_without_the_extra_the_capsules_are_drawn_and_a_sentence_says_why(panda_model, monkeypatch):
-    monkeypatch.setattr(surfaces, "_vendor_folder", lambda: None)
-    meshes, sentence = vendor_surfaces(panda_model)
+def test_an_arm_of_which_there_are_no_surfaces_is_drawn_by_its_capsules_and_a_sentence_says_why(fr3_model):
+    meshes, sentence = vendor_surfaces(fr3_model)
     assert meshes == {}
-    assert sentence == f"The arm is drawn by its capsules; for the vendor's surfaces run {MESHES.command}"
+    assert sentence == "The arm is drawn by its capsules, because there are no surfaces for fr3."
 
 
-def test_with_the_extra_every_link_has_a_surface_near_its_capsules(panda_model):
-    skip_without(MESHES)
+def test_every_link_of_a_panda_has_a_surface_near_its_capsules(panda_model):
     meshes, sentence = vendor_surfaces(panda_model)
     assert sentence == ""
     for link in np.unique(panda_model.capsules.link):

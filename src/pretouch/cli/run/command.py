@@ -109,7 +109,7 @@ def _run(command: Run[Any], write: Callable[[Any], None]) -> int:
             if confirmed and not command.robot.confirm_push:
                 say("The force sign of this robot was confirmed before; --confirm-push repeats it.")
             else:
-                _confirm(standing, opened, rest)
+                _confirm(standing, opened, rest, command.connection.simulated)
                 if opened.identity:
                     remembered.add(opened.identity)
                 say("The force sign is confirmed: the robot reports the force on the arm, in the base frame.")
@@ -132,11 +132,12 @@ def _checked(standing: StandingArm, notes: Sequence[str]) -> Standstill:
     return rest
 
 
-def _confirm(standing: StandingArm, opened: OpenedArm, rest: Standstill) -> None:
-    """Confirm the force sign by guided pushes."""
+def _confirm(standing: StandingArm, opened: OpenedArm, rest: Standstill, simulated: bool) -> None:
+    """Confirm the force sign by guided pushes, of a person or a simulated one."""
+    push = "A simulated person pushes the hand" if simulated else "Push the hand gently"
 
     def ask(direction: Direction) -> None:
-        say(f"Push the hand gently, with about 15 N and for a second, towards {direction.words}.")
+        say(f"{push}, with about 15 N and for a second, towards {direction.words}.")
         opened.push(direction)
 
     GuidedPush(standing.arm, standing.clock, standing.controller.model, ask, say).confirm(rest)
