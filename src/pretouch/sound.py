@@ -259,11 +259,9 @@ def sound_desired(desired: Desired | None, joints: int, now: float) -> tuple[Des
         return None, "its stamps do not increase"
     if stamp[0] > now + _AHEAD_S:
         return None, f"it is stamped {stamp[0] - now:.0f} s in the future"
-    if kind is DesiredKind.POSE and not _are_rotations(number[:, 3:].reshape(-1, 3, 3)):
-        return None, "its orientation is no rotation"
+    if kind is DesiredKind.POSE:
+        R = number[:, 3:].reshape(-1, 3, 3)
+        orthonormal = np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)) < _ROUNDING
+        if not (orthonormal.all() and (np.linalg.det(R) > 0.0).all()):
+            return None, "its orientation is no rotation"
     return replace(sound, kind=kind), ""
-
-
-def _are_rotations(R: FloatArray) -> bool:
-    orthonormal = np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)) < _ROUNDING
-    return bool(orthonormal.all() and (np.linalg.det(R) > 0.0).all())

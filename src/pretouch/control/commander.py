@@ -49,9 +49,12 @@ def reference_of(
     number, rate = _at(desired, now)
     R, here, gain = kin.rotation[model.ee], kin.position[model.ee], params.position_gain_1_s
     if desired.kind is DesiredKind.TWIST:
-        turning = bool(number[3:].any())
-        goal = _leading_rotation(R, number[3:], params) if turning else orientation
-        return MotionReference(scale * number[:3], here, goal, R if turning else orientation)
+        if not number[3:].any():
+            return MotionReference(scale * number[:3], here, orientation, orientation)
+        speed = float(np.linalg.norm(number[3:]))
+        share = speed / params.orientation_gain_1_s if params.orientation_gain_1_s > 0.0 else 0.0
+        goal = rotation_about(number[3:] / speed, math.asin(min(1.0, share))) @ R  # to it the gain answers so fast
+        return MotionReference(scale * number[:3], here, goal, R)
     if desired.kind is DesiredKind.POSE:
         velocity = rate[:3] + gain * (number[:3] - here)
         share = scale * _share(velocity, rate[:3], params)
@@ -81,13 +84,6 @@ def _share(velocity: FloatArray, planned: FloatArray, params: TaskParams) -> flo
     """Share of a velocity (3,) [m/s] that is no faster than the task's, or than the plan's where that is faster."""
     length, fastest = float(np.linalg.norm(velocity)), max(params.speed_m_s, float(np.linalg.norm(planned)))
     return 1.0 if length <= fastest else fastest / length
-
-
-def _leading_rotation(R: FloatArray, angular: FloatArray, params: TaskParams) -> FloatArray:
-    """Return the orientation (3, 3) that the task's gain answers with an angular velocity (3,) [rad/s]."""
-    speed = float(np.linalg.norm(angular))
-    share = speed / params.orientation_gain_1_s if params.orientation_gain_1_s > 0.0 else 0.0
-    return rotation_about(angular / speed, math.asin(min(1.0, share))) @ R
 
 
 def _rotation_towards(R: FloatArray, goal: FloatArray) -> FloatArray:

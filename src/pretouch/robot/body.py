@@ -124,10 +124,7 @@ class Surface(NamedTuple):
 def bodies_of(moved_by: BoolArray) -> IntArray:
     """Return the rigid body (L,) of each link, from the joints (L, n) that move it; -1 for links that none moves."""
     patterns = [tuple(row) for row in moved_by.tolist()]
-    bodies: dict[tuple[bool, ...], int] = {}
-    for pattern in patterns:
-        if any(pattern):
-            bodies.setdefault(pattern, len(bodies))
+    bodies = {pattern: i for i, pattern in enumerate(dict.fromkeys(filter(any, patterns)))}
     return np.array([bodies.get(pattern, -1) for pattern in patterns], dtype=np.int64)
 
 

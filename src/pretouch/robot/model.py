@@ -67,7 +67,8 @@ class RobotModel:
         """The part of the body that any joint moves."""
         if not len(self.body.link):
             raise RobotModelError(f"{description.name}: no joint moves a capsule: give the links capsule geoms.")
-        self.apart: IntArray = self._pairs_apart()
+        moved = self.moved_by[self.capsules.link]
+        self.apart: IntArray = np.argwhere(np.triu((moved[:, None] != moved[None]).sum(axis=2) >= 2))
         """(P, 2) pairs of capsules with two joints or more between them, by their index; see `robot.postures`."""
         self.parts: IntArray = np.unique(self.body.link)
         """(P,) links of the body."""
@@ -112,11 +113,6 @@ class RobotModel:
             start, count = self._model.body_jntadr[body], self._model.body_jntnum[body]
             moved[body, start : start + count] = True
         return moved
-
-    def _pairs_apart(self) -> IntArray:
-        moved = self.moved_by[self.capsules.link]
-        between = (moved[:, None] != moved[None]).sum(axis=2)
-        return np.argwhere(np.triu(between >= 2))
 
     def _inertia(self) -> FloatArray:
         principal, turned = np.empty((self._model.nbody, 3, 3)), np.empty(9)

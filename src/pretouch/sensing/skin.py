@@ -226,8 +226,11 @@ class _UnitTable(Struct, forbid_unknown_fields=True):
 
 def _entry(unit: SensorUnit) -> dict[str, Any]:
     """Return the table of a unit in a skin file."""
+    from scipy.spatial.transform import Rotation  # see `_rotation`
+
+    wxyz = Rotation.from_matrix(unit.T_link_sensor[:3, :3]).as_quat(canonical=True, scalar_first=True).tolist()
     T, touch = unit.T_link_sensor, unit.touch is not None and (unit.touch == TouchPatch() or asdict(unit.touch))
-    pose, sigmas = (T[:3, 3].tolist(), _quaternion(T[:3, :3])), (unit.position_sigma, unit.orientation_sigma)
+    pose, sigmas = (T[:3, 3].tolist(), wxyz), (unit.position_sigma, unit.orientation_sigma)
     entry = (unit.id, unit.link, *pose, *sigmas, touch, unit.sensor.label)
     names, usual = _UnitTable.__struct_fields__, _UnitTable.__struct_defaults__
     defaults = dict(zip(names[-len(usual) :], usual, strict=True))
@@ -277,10 +280,3 @@ def _rotation(w: float, x: float, y: float, z: float) -> FloatArray:
         [2 * (x * y + z * w), -xx + yy - zz + ww, 2 * (y * z - x * w)],
         [2 * (x * z - y * w), 2 * (y * z + x * w), -xx - yy + zz + ww],
     ])  # fmt: skip
-
-
-def _quaternion(R: FloatArray) -> list[float]:
-    from scipy.spatial.transform import Rotation  # see `_rotation`
-
-    wxyz: list[float] = Rotation.from_matrix(R).as_quat(canonical=True, scalar_first=True).tolist()
-    return wxyz
