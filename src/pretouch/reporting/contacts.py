@@ -124,7 +124,9 @@ def contacts_in(course: RunCourse) -> ContactMeasures:
     touches = touches_of(course.truth)
     detections = _detections(course, touches)
     answered = {detection.touch for detection in detections}
-    unanswered = {i: _mode_at(course, touch.start) for i, touch in enumerate(touches) if i not in answered}
+    at = np.searchsorted(course.time, [touch.start for touch in touches], side="right") - 1  # the steps in force then
+    modes = [MODES[course.mode[step]] if step >= 0 else None for step in at.tolist()]
+    unanswered = {i: mode for i, mode in enumerate(modes) if i not in answered}
     return ContactMeasures(course.truth is not None, tuple(detections), tuple(touches), unanswered)
 
 
@@ -170,13 +172,15 @@ def _detections(course: RunCourse, touches: Sequence[TrueTouch]) -> list[FeltCon
             min(max(end, int(np.searchsorted(course.time, over, side="right"))), following),
         )
         force, late = course.force[during], course.time[during] >= begun + TRANSIENT_S
+        finite = force[np.isfinite(force).all(axis=1)]
+        farthest = finite[np.abs(finite).argmax(axis=0), np.arange(3)] if len(finite) else np.full(3, np.nan)
         size = np.linalg.norm(np.where(np.isfinite(force), force, np.nan), axis=1)
         detections.append(
             FeltContact(
                 step=i,
                 time=time,
                 contact=contact,
-                peak=_farthest(force),
+                peak=farthest,
                 peak_norm=float(np.fmax.reduce(size, initial=np.nan)),
                 lasting=float(np.fmax.reduce(size[late], initial=np.nan)),
                 reaction_speed=speed,
@@ -188,20 +192,6 @@ def _detections(course: RunCourse, touches: Sequence[TrueTouch]) -> list[FeltCon
         )
         answered.add(touch)
     return detections
-
-
-def _mode_at(course: RunCourse, time: float) -> Mode | None:
-    """Mode of the step in force at an instant [s], None before the first."""
-    i = int(np.searchsorted(course.time, time, side="right")) - 1
-    return MODES[course.mode[i]] if i >= 0 else None
-
-
-def _farthest(force: FloatArray) -> FloatArray:
-    """Value farthest from zero (3,) of each column of forces (S, 3), NaN of none."""
-    finite = force[np.isfinite(force).all(axis=1)]
-    if not len(finite):
-        return np.full(3, np.nan)
-    return finite[np.abs(finite).argmax(axis=0), np.arange(3)]
 
 
 def _largest(values: list[float]) -> float | None:
@@ -251,10 +241,12 @@ def _touched(contacts: ContactMeasures) -> Html:
     if not contacts.touches:
         return element("p", "Nothing truly touched the arm.")
     answers = {d.touch: (f"contact {i}", d.delay) for i, d in reversed(list(enumerate(contacts.detections, 1)))}
+    why: dict[Mode | None, Text] = {Mode.REACT: "none: the arm was yielding already", Mode.HOLD: bad("missed in HOLD")}
     rows: list[Row] = []
     many = len(contacts.touches) > MOST_ROWS  # then those without an answer come first
     for i, touch in sorted(enumerate(contacts.touches), key=lambda one: many and one[0] in answers):
-        answer, delay = answers[i] if i in answers else (_why(contacts.unanswered[i]), None)
+        missed = contacts.unanswered.get(i)
+        answer, delay = answers[i] if i in answers else (why.get(missed, bad("missed")), None)
         rows.append(
             {
                 "no.": str(i + 1),
@@ -274,13 +266,6 @@ def _touched(contacts: ContactMeasures) -> Html:
         f" than {BOUNCE_S:g} s are bounces of one touch. Speed: of the point of the arm that touched first."
     )
     return table(rows, note, 3, "True touches (simulation)")
-
-
-def _why(mode: Mode | None) -> Text:
-    """Reason why a touch has no detection."""
-    if mode is Mode.REACT:
-        return "none: the arm was yielding already"
-    return bad("missed" + (" in HOLD" if mode is Mode.HOLD else ""))
 
 
 def _false(detections: Sequence[FeltContact]) -> Html:

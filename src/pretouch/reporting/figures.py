@@ -61,7 +61,10 @@ def _panels(course: RunCourse, heights: Sequence[float], height: float) -> tuple
     panels: list[Axes] = list(figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0])
     switches = course.time[1:][np.diff(course.run) != 0]
     for axes in panels:
-        _frame(axes, course)
+        axes.grid(alpha=0.25, lw=0.6)
+        axes.spines[["top", "right"]].set_visible(False)
+        if len(course) > _MOST_DRAWN:
+            axes.set_rasterization_zorder(_MARKS)
         axes.margins(x=0)
         for mode, colour in _SHADES.items():
             flags = course.mode == MODES.index(mode)
@@ -74,13 +77,6 @@ def _panels(course: RunCourse, heights: Sequence[float], height: float) -> tuple
             axes.axvline(time, color=INK, lw=0.8, ls=(0, (1, 2)))
     panels[-1].set_xlabel("time [s]")
     return figure, panels
-
-
-def _frame(axes: Axes, course: RunCourse) -> None:
-    axes.grid(alpha=0.25, lw=0.6)
-    axes.spines[["top", "right"]].set_visible(False)
-    if len(course) > _MOST_DRAWN:
-        axes.set_rasterization_zorder(_MARKS)
 
 
 def _legend(axes: Axes, columns: int) -> None:

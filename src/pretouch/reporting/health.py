@@ -5,11 +5,10 @@ import numpy as np
 from pretouch.reporting.html import NOTHING, Html, Row, Text, bad, element, facts, joined, number, percent, table
 from pretouch.reporting.record import NO_READING, RunCourse, spread
 from pretouch.types import BoolArray, FloatArray, RangeStatus
+from pretouch.units.health import noise_of, status_name
 
-_MAD_TO_SIGMA = 1.4826
-"""Standard deviation over median absolute deviation, of a normal distribution."""
 _FEW = 5
-"""Fewer readings than this tell no rate and no noise."""
+"""Fewer readings than this tell no rate."""
 _LOST = 0.05
 """Share of lost measurements from which it is marked."""
 
@@ -35,8 +34,8 @@ def unit_row(course: RunCourse, k: int) -> Row:
     lost = max(0.0, 1 - len(gaps) / expected) if expected else 0.0
     latency, time = spread(course.time[fresh] - stamps), course.time[course.with_inputs]
     silence = float(np.diff(np.concatenate([time[:1], np.sort(stamps), time[-1:]])).max()) if len(time) else None
-    noise = _noise(np.where(statuses == RangeStatus.OK, course.reading_distance[fresh, k], np.nan))
-    counts = [f"{_status(code)} {np.sum(statuses == code)}" for code in np.unique(statuses)]
+    noise = noise_of(np.where(statuses == RangeStatus.OK, course.reading_distance[fresh, k], np.nan))
+    counts = [f"{status_name(code)} {np.sum(statuses == code)}" for code in np.unique(statuses)]
     share = percent(lost if expected else None, 1)
     return {
         "unit": course.units[k],
@@ -82,20 +81,6 @@ def _fresh(stamp: FloatArray) -> BoolArray:
     fresh = np.zeros(len(stamp), np.bool_)
     fresh[finite] = np.diff(stamp[finite], prepend=np.nan) != 0
     return fresh
-
-
-def _status(code: int) -> str:
-    return RangeStatus(code).name if code in RangeStatus._value2member_map_ else str(code)
-
-
-def _noise(distance: FloatArray) -> float | None:
-    """Noise [m] of successive distances (R,), NaN where there is none: a steady motion drops out of it."""
-    bend = np.diff(distance, n=2)
-    bend = bend[np.isfinite(bend)]
-    if len(bend) < _FEW:
-        return None
-    # the second difference of independent errors has 1 + 4 + 1 times their variance
-    return float(_MAD_TO_SIGMA * np.median(np.abs(bend - np.median(bend))) / np.sqrt(6.0))
 
 
 def _milliseconds(times: FloatArray) -> str:

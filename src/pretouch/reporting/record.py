@@ -1,6 +1,6 @@
 """A recording as arrays: all that a report tells of it, read in one pass."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import groupby, islice
 from typing import NamedTuple
@@ -114,24 +114,18 @@ def gather(recorded: Recorded) -> RunCourse:
     blocks, contacts, touches, count = list[Columns](), [], [], 0
     times, forces = list[FloatArray](), list[FloatArray]()
     model, units = recorded.runs[0].model, len(recorded.runs[0].skin)
-    for batch in _batches(recorded):
-        blocks.append(_block(batch, len(model.links), units))
-        contacts += contacts_of([cycle.step for cycle in batch], count)
-        count += len(batch)
-        if truths := [cycle.truth for cycle in batch if cycle.truth is not None]:
-            times.append(np.concatenate([truth.time for truth in truths]))
-            forces.append(np.concatenate([truth.force for truth in truths]))
-            touches += [(time, model.links[link], velocity) for t in truths for time, link, velocity in t.touches]
+    for _, cycles in groupby(recorded, key=lambda cycle: cycle.run):
+        while batch := list(islice(cycles, _BATCH)):
+            blocks.append(_block(batch, len(model.links), units))
+            contacts += contacts_of([cycle.step for cycle in batch], count)
+            count += len(batch)
+            if truths := [cycle.truth for cycle in batch if cycle.truth is not None]:
+                times.append(np.concatenate([truth.time for truth in truths]))
+                forces.append(np.concatenate([truth.force for truth in truths]))
+                touches += [(time, model.links[link], velocity) for t in truths for time, link, velocity in t.touches]
     columns = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
     truth = TrueForces(np.concatenate(times), np.concatenate(forces), tuple(touches)) if times else None
     return RunCourse(runs=tuple(recorded.runs), contacts=tuple(contacts), truth=truth, **columns)
-
-
-def _batches(recorded: Recorded) -> Iterator[list[Kept]]:
-    """Cycles of one run each, no more than `_BATCH` at a time."""
-    for _, cycles in groupby(recorded, key=lambda cycle: cycle.run):
-        while batch := list(islice(cycles, _BATCH)):
-            yield batch
 
 
 def _block(batch: list[Kept], links: int, units: int) -> Columns:
@@ -171,7 +165,9 @@ def _inputs(batch: list[Kept], units: int) -> Columns:
     """Inputs of the steps; those that a controller could not use may hold anything."""
     inputs = [cycle.inputs for cycle in batch]
     lacking = RangeReadings(np.full(units, np.nan), np.full(units, np.nan), np.full(units, NO_READING))
-    readings = [lacking if i is None or not _fit(i.readings, units) else i.readings for i in inputs]
+    readings = [lacking if i is None else i.readings for i in inputs]
+    names = ("stamp", "distance", "status")
+    readings = [r if all(np.shape(getattr(r, n)) == (units,) for n in names) else lacking for r in readings]
     return {
         "with_inputs": np.array([i is not None for i in inputs]),
         "robot_stamp": np.array([np.nan if i is None else float(i.robot.stamp) for i in inputs]),
@@ -180,10 +176,6 @@ def _inputs(batch: list[Kept], units: int) -> Columns:
         "reading_distance": np.array([r.distance for r in readings]),
         "reading_status": np.array([r.status for r in readings]),
     }
-
-
-def _fit(readings: RangeReadings, units: int) -> bool:
-    return all(np.shape(part) == (units,) for part in (readings.stamp, readings.distance, readings.status))
 
 
 class Percentiles(NamedTuple):

@@ -138,9 +138,8 @@ class PushOutcome:
             self._detected = step.stamp - self._begin
         elif self._detected is not None:
             self._moved = self._moved or answers(step)
-        return self._sentence() if step.stamp >= self._end + _GRACE_S else ""
-
-    def _sentence(self) -> str:
+        if step.stamp < self._end + _GRACE_S:
+            return ""
         push = f"The push of {self._size:.0f} N"
         if self._detected is not None:
             answer = "the arm moved with it" if self._moved else "the arm held still: the push was too weak to move it"

@@ -71,20 +71,18 @@ class Channel(Generic[Item]):
 
     def put(self, item: Item, now: float) -> None:
         """Send a datagram at a time [s]."""
-        if self._rng.random() < self._params.loss:
+        p, rng = self._params, self._rng
+        if rng.random() < p.loss:
             self.lost += 1
             return
-        for _ in range(1 + int(self._rng.random() < self._params.doubled)):
-            self._sent.send(now + self._delay(), item)
+        for _ in range(1 + int(rng.random() < p.doubled)):
+            held_up = p.held_up_s if rng.random() < p.overtaken else 0.0
+            delay = p.delay_s + float(rng.gamma(p.jitter_shape, p.jitter_s / p.jitter_shape)) + held_up
+            self._sent.send(now + delay, item)
 
     def take(self, now: float) -> list[Item]:
         """Return what has arrived by a time [s] and was not taken yet, in the order of arrival."""
         return list(self._sent.arrived(now))
-
-    def _delay(self) -> float:
-        p, rng = self._params, self._rng
-        held_up = p.held_up_s if rng.random() < p.overtaken else 0.0
-        return p.delay_s + float(rng.gamma(p.jitter_shape, p.jitter_s / p.jitter_shape)) + held_up
 
 
 @dataclass(frozen=True)

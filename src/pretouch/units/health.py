@@ -205,7 +205,10 @@ def unit_health(samples: Sequence[Received], now: float, traffic: UnitTraffic, b
     good = np.array([h.sample.range_mm / 1000 if h.sample.range_status == _OK else np.nan for h in fresh])
     ages = np.array([h.arrival - h.stamp for h in fresh if math.isfinite(h.stamp)])
     sigmas = [h.sample.range_sigma / 4000 for h in fresh if h.sample.range_status == _OK]
-    heard_s = now - samples[0].arrival if samples else 0.0
+    heard_s, clock_unknown_s = now - samples[0].arrival if samples else 0.0, 0.0
+    if samples and not math.isfinite(traffic.bound):
+        clocked = (h.arrival for h in samples if math.isfinite(h.bound))
+        clock_unknown_s = now - max(clocked, default=samples[0].arrival)
     boot = _since_reboot([h.sample for h in samples])
     last = boot[-1] if boot else None
     newest = fresh[-1] if fresh else None
@@ -227,14 +230,14 @@ def unit_health(samples: Sequence[Received], now: float, traffic: UnitTraffic, b
         distance_m=newest.sample.range_mm / 1000 if newest else math.nan,
         status=newest.sample.range_status if newest else RangeStatus.NONE,
         sigma_m=float(np.median(sigmas)) if sigmas else math.nan,
-        noise_m=_noise(good),
+        noise_m=noise_of(good),
         statuses={status_name(s): count for s, count in Counter(h.sample.range_status for h in fresh).items()},
         battery_v=last.battery_mv / 1000 if last and last.battery_mv else math.nan,
         temperature_c=last.temperature_cdeg / 100 if last and last.temperature_cdeg != NO_TEMPERATURE else math.nan,
         # its count ends at 65535, its flags do not
         bus_errors=max(last.bus_errors - boot[0].bus_errors, sum(bool(f & _BUS_ERROR) for f in flags)) if last else 0,
         restarts=sum(bool(f & _RESTARTED) for f in flags),
-        clock_unknown_s=_clock_unknown(samples, now, traffic),
+        clock_unknown_s=clock_unknown_s,
         range_late=sum(bool(f & _LATE) for f in flags),
         imu_rate_hz=imu_rate_hz,
         imu_loss=imu_loss,
@@ -248,13 +251,6 @@ def unit_health(samples: Sequence[Received], now: float, traffic: UnitTraffic, b
 def status_name(code: int) -> str:
     """Return the name of a `RangeStatus`, or the number of one there is not."""
     return RangeStatus(code).name if code in RangeStatus._value2member_map_ else str(code)
-
-
-def _clock_unknown(samples: Sequence[Received], now: float, traffic: UnitTraffic) -> float:
-    """Return the time [s] for which a unit's clock has been unknown."""
-    if math.isfinite(traffic.bound) or not samples:
-        return 0.0
-    return now - max((h.arrival for h in samples if math.isfinite(h.bound)), default=samples[0].arrival)
 
 
 def _since_reboot(samples: Sequence[Sample]) -> list[Sample]:
@@ -282,8 +278,8 @@ def _imu(samples: Sequence[Sample]) -> tuple[float, float]:
     return counted / elapsed, max(0, missing) / counted
 
 
-def _noise(distance: FloatArray) -> float:
-    """Noise [m] of successive distances (R,), NaN where there is none."""
+def noise_of(distance: FloatArray) -> float:
+    """Noise [m] of successive distances (R,), NaN where there is none: a steady motion drops out of it."""
     bend = np.diff(distance, n=2)
     bend = bend[np.isfinite(bend)]
     if len(bend) < _FEW:

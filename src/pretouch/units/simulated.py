@@ -93,7 +93,11 @@ class SimulatedUnit:
         self._reset = Reset.POWER_ON
         self._reboots: Iterator[float] = iter(reboots)
         self._next_reboot = next(self._reboots, np.inf)
-        self._imu_scale, self._imu_rate = (0, 0) if imu is None else (_scale(imu), round(imu.rate_hz))
+        self._imu_scale, self._imu_rate = 0, 0
+        if imu is not None:  # full scales as a sample has them
+            rates = list(ANGULAR_RATE_LSB).index(imu.angular_rate_range_dps)
+            self._imu_scale = list(ACCELERATION_LSB).index(imu.acceleration_range_g) | rates << 4
+            self._imu_rate = round(imu.rate_hz)
         self.silent = False
         """True if it neither sends nor hears: out of power, or out of reach."""
         self.delay_s = PAPER_SENSOR.delay_s
@@ -298,9 +302,3 @@ def _nothing(time: float) -> RangeSample:
 def _field(value: float, units: float) -> int:
     """Number of units in a value, as 16 bits hold it."""
     return min(max(0, round(units * value)), 0xFFFF)
-
-
-def _scale(imu: ImuParams) -> int:
-    """Full scales of an IMU as a sample has them."""
-    acceleration = list(ACCELERATION_LSB).index(imu.acceleration_range_g)
-    return acceleration | list(ANGULAR_RATE_LSB).index(imu.angular_rate_range_dps) << 4

@@ -144,16 +144,12 @@ class UnitWatch:
         self._look_due = self._compare_due = -math.inf
 
     def take(self) -> list[Received]:
-        """Collect the samples if it is time to; return them. It may be called at any rate."""
-        self._compare()
-        return self._look() if time.monotonic() >= self._look_due else []
-
-    def _compare(self) -> None:
-        """Compare readings with the model, where that is due."""
+        """Compare readings with the model, and collect the samples, each if it is time to; return them."""
         now = time.monotonic()
         if self._check and self._posture and now >= self._compare_due:
             self._compare_due = now + _COMPARE_S
             self._check.take(self._posture(), self.units.read())
+        return self._look() if time.monotonic() >= self._look_due else []
 
     def _look(self) -> list[Received]:
         if not self.units.alive:
