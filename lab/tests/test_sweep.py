@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from pretouch import cli
 from pretouch.errors import ExperimentError
 from pretouch.profiles import profile
-from pretouch.sensing.sensor import PAPER_SENSOR
 from pretouch_lab import sweep as sweeps
 from pretouch_lab.bench.dense_skin import UNITS, units_of
 from pretouch_lab.domain_randomisation import drawn, named_set, world_set
@@ -146,7 +145,7 @@ def test_each_value_arrives_where_its_name_says():
     own = profile(cell["profile"])
     assert (own.detect.f_base_n, own.detect.f_std_n, own.approach.rows, own.slow) == (8.25, 1 / 3 + 1e-9, "floor", None)
     assert (context.plant.mass_error, context.plant.payload_max_kg) == (0.1, 0.5)
-    assert (context.ranging.latency_s, context.ranging.period_of(PAPER_SENSOR)) == (0.1, 0.1)
+    assert (context.ranging.latency_s, context.ranging.rate_hz) == (0.1, 10.0)
     assert (len(context.skin), cell["side"], cell["trajectory"]) == (3, "+y", "circle")
 
 

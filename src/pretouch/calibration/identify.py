@@ -81,8 +81,18 @@ class Identifier:
         if matches[0][1].likeness < _LIKENESS:
             near, matches = matches[0][1], self._matches(signal, own, np.inf)
             if matches[0][1].likeness < _LIKENESS:
-                return Identified(findings=[_fits_none(near.likeness)])
-            findings.append(_clock(matches[0][1].late))
+                sentence = (
+                    f"It fits no link of this arm: at most {near.likeness:.0%} of its rotation matches a link (at least"
+                    f" {_LIKENESS:.0%} needed). Check that its data are of this run and arm, that a joint moves its"
+                    " link, and that it does not swing or slip on it."
+                )
+                return Identified(findings=[Remark("no_link", sentence, True)])
+            late = matches[0][1].late
+            sentence = (
+                f"Its clock is {'late' if late > 0 else 'early'} by {abs(late):.3f} s, more than {CLOCK_ERROR_S:g} s:"
+                " check that its data are of this run, then correct the stamps."
+            )
+            findings.append(Remark("clock", sentence, True))
         close = [(body, match) for body, match in matches if match.likeness >= matches[0][1].likeness - _CLOSE]
         return self._chosen(signal, close, named, findings)
 
@@ -149,23 +159,6 @@ def _gyroscope(w: FloatArray, sensed: FloatArray) -> Remark | None:
         sentence = "Its gyroscope's axes are mirrored: one has the wrong sign, or two are swapped; correct them."
         return Remark("mirrored", sentence, True)
     return None
-
-
-def _fits_none(best: float) -> Remark:
-    sentence = (
-        f"It fits no link of this arm: at most {best:.0%} of its rotation matches a link (at least"
-        f" {_LIKENESS:.0%} needed). Check that its data are of this run and arm, that a joint moves its link, and"
-        " that it does not swing or slip on it."
-    )
-    return Remark("no_link", sentence, True)
-
-
-def _clock(late: float) -> Remark:
-    sentence = (
-        f"Its clock is {'late' if late > 0 else 'early'} by {abs(late):.3f} s, more than {CLOCK_ERROR_S:g} s:"
-        " check that its data are of this run, then correct the stamps."
-    )
-    return Remark("clock", sentence, True)
 
 
 def align(

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.calibration.fit import CLOCK, PLACE, POSE_PRIOR, Estimate, Fit, fit, start
+from pretouch.calibration.fit import CLOCK, PLACE, POSE_PRIOR, Estimate, fit, start
 from pretouch.calibration.link_motion import ArmMotion, LinkMotion
 from pretouch.calibration.signals import FINE_S, ImuSignal, Measured, smooth, times
 from pretouch.calibration.values import CUTOFF_HZ, SHORTEST_S, TOLERATED_ACCELERATION, TOLERATED_ANGULAR_VELOCITY
@@ -80,7 +80,9 @@ def locate(arm: ArmMotion, signal: ImuSignal, link: int, late: float) -> Located
     if not enough(arm, used):
         inliers, used = np.ones_like(inliers), instants
     here, measured = here.at(inliers), Measured(measured.values[inliers], measured.rates[inliers])
-    solution, noise = _final(solution, here, measured, noise)
+    for _ in range(2):  # without robustness, weighted by the residuals of each sensor
+        solution = fit(here, measured, solution.estimate, noise)
+        noise = np.repeat(np.sqrt((solution.noise.reshape(2, 3) ** 2).mean(axis=1)), 3)
     C, late = 0.5 * (solution.covariance + solution.covariance.T), assumed + float(solution.estimate.errors[CLOCK])
     return Located(link, solution.estimate, C[:6, :6], noise, late, instants, used)
 
@@ -90,14 +92,6 @@ def explained(estimate: Estimate, motion: LinkMotion, measured: Measured) -> Boo
     size = np.linalg.norm(estimate.differences(motion, measured).reshape(-1, 2, 3), axis=2)
     tolerated = np.array([TOLERATED_ANGULAR_VELOCITY, TOLERATED_ACCELERATION])
     return np.all(size <= np.maximum(tolerated, _OUTLIER_FACTOR * np.median(size, axis=0)), axis=1)
-
-
-def _final(solution: Fit, motion: LinkMotion, measured: Measured, noise: FloatArray) -> tuple[Fit, FloatArray]:
-    """Fit without robustness, weighted by the residuals of each sensor (6,)."""
-    for _ in range(2):
-        solution = fit(motion, measured, solution.estimate, noise)
-        noise = np.repeat(np.sqrt((solution.noise.reshape(2, 3) ** 2).mean(axis=1)), 3)
-    return solution, noise
 
 
 class JointNoise:

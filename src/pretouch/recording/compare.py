@@ -134,7 +134,9 @@ def compare(recorded: "Recorded", profile: Profile, progress: Callable[[int], No
     """
     theirs, ours = list[Decision](), list[Decision]()
     controllers = [run.controller() for run in recorded.runs]
-    others = [_with_profile(c, profile) for c in controllers]
+    periods = [c.profile.task.control_period_s for c in controllers]
+    profiles = [profile if profile.task.control_period_s == s else at_rate(profile, 1 / s) for s in periods]
+    others = [Controller(c.model, c.skin, c.fixtures, c.path, p) for c, p in zip(controllers, profiles, strict=True)]
     state: ControllerState | None = None
     last = left_out = 0
     for i, cycle in enumerate(recorded):
@@ -180,13 +182,6 @@ def paired(
     ]
     pairs += [(None, b) for j, b in enumerate(second) if j not in partner.values()]
     return tuple(sorted(pairs, key=lambda pair: min(contact.time_s for contact in pair if contact)))
-
-
-def _with_profile(controller: Controller, profile: Profile) -> Controller:
-    period = controller.profile.task.control_period_s
-    if profile.task.control_period_s != period:
-        profile = at_rate(profile, 1 / period)
-    return Controller(controller.model, controller.skin, controller.fixtures, controller.path, profile)
 
 
 def _first_state(

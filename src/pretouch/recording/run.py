@@ -89,18 +89,18 @@ def versions() -> dict[str, str]:
     """Return what a recomputation to the bit rests on: program, its source, libraries, machine."""
     program = {"pretouch": __version__, "source": source_digest(Controller)[:12]}
     libraries = {name: version(name) for name in _LIBRARIES}
-    system = {"python": platform.python_version(), "system": platform.system(), "machine": _machine()}
-    return program | libraries | system
+    machine = f"{platform.machine()} {processor()}".strip()  # the kind of processor decides how a sum is rounded
+    return program | libraries | {"python": platform.python_version(), "system": platform.system(), "machine": machine}
 
 
-def _machine() -> str:
-    """Name the processor: its kind decides how a sum is rounded."""
+def processor() -> str:
+    """Return the name of this machine's processor."""
     try:
         lines = FilePath("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError):
         lines = []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return f"{platform.machine()} {names[0] if names else platform.processor()}".strip()
+    return names[0] if names else platform.processor()
 
 
 class Run:

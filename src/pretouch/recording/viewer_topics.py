@@ -102,7 +102,9 @@ class ViewerTopics:
     def _drawings(self, step: ControlStep, sequence: int, time: int) -> Iterator[Item]:
         """Yield what is to be drawn of a step; nothing so soon after another."""
         if self._drawn is None:
-            yield item("/tf_static", TRANSFORMS, sequence, time, self._sensors(time))
+            at, poses = divmod(time, 10**9), [(u.link, u.id, u.T_link_sensor) for u in self._skin.units]
+            places = [messages().transform(at, link, name, T[:3, 3], T[:3, :3]) for link, name, T in poses]
+            yield item("/tf_static", TRANSFORMS, sequence, time, places)
             yield item("/markers/scene", MARKERS, sequence, time, self._standing(time))
         elif 0 <= time - self._drawn < _PERIOD_NS:
             return
@@ -115,11 +117,6 @@ class ViewerTopics:
         kin, links, at = self._model.kinematics(q), self._model.links, divmod(time, 10**9)
         poses = zip(links[1:], kin.position[1:], kin.rotation[1:], strict=True)
         return [messages().transform(at, links[0], link, p, R) for link, p, R in poses]
-
-    def _sensors(self, time: int) -> list[Any]:
-        at, units = divmod(time, 10**9), self._skin.units
-        poses = [(unit.link, unit.id, unit.T_link_sensor) for unit in units]
-        return [messages().transform(at, link, name, T[:3, 3], T[:3, :3]) for link, name, T in poses]
 
     def _sensed(self, step: ControlStep, time: int) -> list[Any]:
         """Sensed points as spheres, and the closest pairs as lines."""

@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
-from pretouch.sensing.sensor import Capacitive, Sensor, cone_rays
+from pretouch.sensing.sensor import Capacitive, cone_rays
 from pretouch.sensing.skin import Skin
 from pretouch.sim.capacitive import STREAM, Electrode
 from pretouch.sim.flaws import flaw_arrays, flaws_of
@@ -55,10 +55,6 @@ class RangeFinderParams(Checked):
     """Times longer than that the period is: units that share a channel, or a processor."""
     dropout: Fraction = 0.005
     """Probability that a reading is lost on its way."""
-
-    def period_of(self, sensor: Sensor) -> float:
-        """Time between readings of a unit with a sensor [s]."""
-        return self.period_factor * (1.0 / self.rate_hz if self.rate_hz else sensor.timing[2])
 
 
 class RangeSample(NamedTuple):
@@ -121,7 +117,8 @@ class RangeFinders:
             for k, unit in enumerate(skin.units)
             if isinstance(unit.sensor, Capacitive)
         }
-        period = np.array([params.period_of(unit.sensor) for unit in skin.mounted])
+        rate = params.rate_hz
+        period = params.period_factor * np.array([1 / rate if rate else u.sensor.timing[2] for u in skin.mounted])
         self._ranging = Ranging(
             p=params.numbers,
             finders=finders,

@@ -18,6 +18,7 @@ from pretouch.loop import MonotonicClock
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import Profile, at_rate, profile
 from pretouch.realtime import real_time, warm_up
+from pretouch.recording.run import processor
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.text_table import TextTable
@@ -155,13 +156,6 @@ def about(request: CycleRequest) -> Row:
         "processors": os.cpu_count(),
         "system": platform.platform(),
     }
-
-
-def processor() -> str:
-    """Return the name of this machine's processor."""
-    lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return models[0] if models else platform.machine()
 
 
 _COLUMNS = (

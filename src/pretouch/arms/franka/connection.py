@@ -231,7 +231,11 @@ class FrankaClient:
             return command
 
         try:
-            self._move_panda(answer) if self.kind == "panda" else self._move_fr3(answer)
+            if self.kind == "panda":  # libfranka 0.9 calls back in each millisecond
+                mode = self._library.ControllerMode.kJointImpedance
+                self._robot.control_joint_velocity(answer, mode, False, _NO_LOW_PASS_HZ)
+            else:
+                self._move_fr3(answer)
         except self._failures as error:
             if raised:
                 raise raised[0] from None
@@ -243,11 +247,6 @@ class FrankaClient:
             raise MotionAborted((), f"The motion of the arm at {self._address} was ended: {text}.") from None
         finally:
             raised.clear()  # the exception holds this frame, and with it the motion
-
-    def _move_panda(self, answer: Callable[[Any, Any], Any]) -> None:
-        """Run a motion through libfranka 0.9, which calls back in each millisecond."""
-        mode = self._library.ControllerMode.kJointImpedance
-        self._robot.control_joint_velocity(answer, mode, False, _NO_LOW_PASS_HZ)
 
     def _move_fr3(self, answer: Callable[[Any, Any], Any]) -> None:
         """Run a motion through pylibfranka, which is asked for each state and given each command.
