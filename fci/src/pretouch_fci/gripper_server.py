@@ -40,7 +40,10 @@ class GripperServer(ClientPort):
         if now >= self.due:
             self.due = max(self.due + _PERIOD_MS / 1000, now)  # a machine that is late leaves the time out
             self._attempt(self._pass_time)
-            self._send_state()
+            self._time_ms += _PERIOD_MS
+            gripper = self._arm.gripper
+            state = (self._time_ms % 2**32, gripper.width, MAX_WIDTH_M, gripper.grasped, _TEMPERATURE_C)
+            self._send(GRIPPER_STATE.pack(*state))
 
     def _came(self, client: Connection) -> None:
         self.due = time.monotonic()
@@ -95,9 +98,3 @@ class GripperServer(ClientPort):
     def _answer(self, request: Request, outcome: Outcome) -> None:
         if self._client is not None:
             self._client.send(GRIPPER.reply(request.name, request.identifier, GRIPPER.status.pack(outcome)))
-
-    def _send_state(self) -> None:
-        self._time_ms += _PERIOD_MS
-        gripper = self._arm.gripper
-        state = (self._time_ms % 2**32, gripper.width, MAX_WIDTH_M, gripper.grasped, _TEMPERATURE_C)
-        self._send(GRIPPER_STATE.pack(*state))

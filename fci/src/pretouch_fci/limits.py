@@ -81,10 +81,6 @@ class MotionLimits:
         }
         return tuple(name for name, wrong in errors.items() if wrong.any())
 
-    def ends_at_rest(self, qd: FloatArray) -> bool:
-        """Return True if a motion may end at velocities (n,) [rad/s]: the acceleration limit stops it at once."""
-        return bool(np.all(np.abs(qd) <= self.qdd * PERIOD_S))
-
     def braked(self, qd: FloatArray) -> FloatArray:
         """Return the velocities (n,) [rad/s] one millisecond of braking later."""
         return np.asarray(np.sign(qd) * np.maximum(0.0, np.abs(qd) - self.qdd * PERIOD_S))

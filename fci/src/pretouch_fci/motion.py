@@ -91,7 +91,7 @@ class Motion:
         if self._external is not None and not np.all(np.isfinite(setpoint.torques)):
             return MotionEnding("input error", ("controller_torque_discontinuity",))
         if setpoint.finished:
-            if self._limits.ends_at_rest(self.qd):
+            if np.all(np.abs(self.qd) <= self._limits.qdd * PERIOD_S):  # the acceleration limit stops it at once
                 return MotionEnding("success")
             return MotionEnding("reflex", (self.kind.moves_at_end,))
         errors = () if self._external is None else self._external.take(setpoint.torques)

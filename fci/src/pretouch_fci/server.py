@@ -118,15 +118,12 @@ class FciServer(ClientPort):
         self._done = done
         while not done() and not (self._options.once and self._served and self._client is None):
             self._settle()
-            self._send_state()
+            if self._client is not None:
+                self._send(self._state.write(self._tick))
             self._wait()
             self._pass_time(self._setpoint())
 
     # a millisecond
-
-    def _send_state(self) -> None:
-        if self._client is not None:
-            self._send(self._state.write(self._tick))
 
     def _wait(self) -> None:
         """Wait for the next millisecond, or in lockstep for the command."""
@@ -170,15 +167,9 @@ class FciServer(ClientPort):
             self._attempt(lambda: handler.motion_ended(ending))
         self._watch(PERIOD_S * self._tick, arm)
         if arm.units is not None:
-            arm.units.step(self._robot_time if lockstep else self._wall_time)
+            arm.units.step(lambda: PERIOD_S * self._tick if lockstep else time.monotonic() - self._start)
         if self._handler is not None and arm.at_rest:
             self._attempt(self._handler.at_rest)
-
-    def _robot_time(self) -> float:
-        return PERIOD_S * self._tick
-
-    def _wall_time(self) -> float:
-        return time.monotonic() - self._start
 
     # commands
 

@@ -38,11 +38,6 @@ _ARRAY: Any = idl.array
 _SEQUENCE: Any = idl.sequence
 
 
-def _as_it_is(message: Any, *_: Any, **__: Any) -> bytes:
-    """Return the bytes of a message, in place of `IdlStruct.serialize`."""
-    return message.cdr
-
-
 def _held(cls: type[Any], data: bytes, *_: Any, **__: Any) -> Any:
     """Return a message that holds bytes, in place of `IdlStruct.deserialize` and, as none has a key, its like."""
     message = object.__new__(cls)
@@ -70,14 +65,10 @@ class WireMessages(ros.Messages):
                 " distribution."
             ) from error
 
-    def type_hash(self, kind: str) -> str:
-        """Return the hash of a type that rmw sends along since Iron."""
-        return self.store.hash_rihs01(kind)
-
     def _wire_type(self, kind: str) -> Any:
         """Class of a type's messages for DDS, which know their type and hold `cdr`: rosbags takes half the time."""
         message_type: Any = make_idl_struct(kind.rpartition("/")[2], _dds_name(kind), self._fields(kind))
-        message_type.serialize = _as_it_is
+        message_type.serialize = lambda message, *_, **__: message.cdr
         message_type.deserialize = message_type.deserialize_key = classmethod(_held)
         return message_type
 

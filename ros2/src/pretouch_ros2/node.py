@@ -223,7 +223,7 @@ class Ros2Node:
             Policy.Durability.TransientLocal if latched else Policy.Durability.Volatile,
             Policy.History.KeepLast(depth),
             Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=False),
-            Policy.Userdata(f"typehash={self.messages.type_hash(kind)};".encode()),
+            Policy.Userdata(f"typehash={self.messages.store.hash_rihs01(kind)};".encode()),
         ]
         if latched:
             policies.append(Policy.DurabilityService(0, Policy.History.KeepLast(depth), -1, -1, -1))
@@ -234,17 +234,14 @@ class Ros2Node:
             while not self._ended:
                 self._waits.wait(duration(seconds=1))
                 if self._discovery.triggered:
-                    self._discover()
+                    self._publications = {
+                        publication.key: publication.topic_name
+                        for publication in self._discovered.read(1000)
+                        if publication.sample_info.instance_state == InstanceState.Alive
+                    }
                 with self._lock:
                     subscriptions = tuple(self._subscriptions)
                 for subscription in subscriptions:
                     subscription.take()
         except Exception as error:  # whoever reads next is told, and stops the arm
             self.failure = f"Receiving from ROS 2 failed ({type(error).__name__}: {error}): restart the program."
-
-    def _discover(self) -> None:
-        self._publications = {
-            publication.key: publication.topic_name
-            for publication in self._discovered.read(1000)
-            if publication.sample_info.instance_state == InstanceState.Alive
-        }
