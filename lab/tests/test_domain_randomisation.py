@@ -2,35 +2,32 @@ from dataclasses import replace
 
 import pytest
 
+from pretouch.control.path import Circle
 from pretouch.errors import ExperimentError
-from pretouch.robot.description import panda
-from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import paper_skin
-from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.range_finder import RangeFinderParams
+from pretouch.profiles import profile
+from pretouch.sim.scene import SceneSpec
 from pretouch_lab.cli import benchmarks
-from pretouch_lab.domain_randomisation import Parts, folder_part, randomised, sentence
+from pretouch_lab.domain_randomisation import folder_part, sentence
 from pretouch_lab.experiment import arguments, context_of
 from pretouch_lab.experiments import static
 from pretouch_lab.options import DetectionOptions, TrialOptions
 from pretouch_lab.run import open_run
-
-MODEL = RobotModel(panda())
-PARTS = Parts(PlantParams(), RangeFinderParams(), paper_skin(MODEL), None)
+from pretouch_lab.trial import Setup, randomised
 
 
-def test_a_world_changes_arm_sensors_and_what_is_believed_of_the_skin():
-    assert randomised("", 1001, MODEL, PARTS) is PARTS
-    parts = randomised("realistic", 1001, MODEL, PARTS)
-    assert parts.plant != PARTS.plant
-    assert parts.ranging != PARTS.ranging
-    assert parts.skin is PARTS.skin
-    assert (parts.believed.T_link_sensor != PARTS.skin.T_link_sensor).any()
-    again = randomised("realistic", 1001, MODEL, PARTS)
-    assert again.plant == parts.plant
-    assert (again.believed.T_link_sensor == parts.believed.T_link_sensor).all()
-    told = replace(PARTS, believed=paper_skin(MODEL))  # as an experiment tells it, which stays
-    assert randomised("stress", 1001, MODEL, told).believed is told.believed
+def test_a_world_changes_arm_sensors_and_what_is_believed_of_the_skin(panda_model, paper_skin):
+    plain = Setup(panda_model, paper_skin, profile("paper"), SceneSpec(), Circle(), 1001)
+    assert randomised(plain) is plain
+    setup = randomised(replace(plain, world="realistic"))
+    assert setup.plant != plain.plant
+    assert setup.ranging != plain.ranging
+    assert setup.skin is plain.skin
+    assert (setup.believed.T_link_sensor != plain.skin.T_link_sensor).any()
+    again = randomised(replace(plain, world="realistic"))
+    assert again.plant == setup.plant
+    assert (again.believed.T_link_sensor == setup.believed.T_link_sensor).all()
+    set_by_hand = replace(plain, believed=paper_skin, world="stress")  # as an experiment sets it, which stays
+    assert randomised(set_by_hand).believed is paper_skin
 
 
 def test_the_nominal_world_plays_as_the_usual_one():

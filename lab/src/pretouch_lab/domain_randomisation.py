@@ -22,7 +22,7 @@ from pretouch.errors import ParameterError, SkinError
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
-from pretouch.sim.plant_params import PlantParams, plant_params_of
+from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.toml_files import parse_toml
 from pretouch.types import FloatArray
@@ -210,34 +210,6 @@ def _value(field: str, spread: FieldSpread, seed: int, usual: Any) -> Any:
 
 
 named_set = cache(world_set)
-
-
-@dataclass(frozen=True)
-class Parts:
-    """Parts of a trial that the domain randomisation draws."""
-
-    plant: PlantParams
-    ranging: RangeFinderParams
-    skin: Skin
-    """Units at their true places."""
-    believed: Skin | None
-    """Units at the places that the controller assumes; None: the true ones."""
-
-
-def randomised(name: str, seed: int, model: RobotModel, parts: Parts) -> Parts:
-    """Draw the parts of a trial from a set by its seed; without a name, return the parts unchanged.
-
-    A value that differs from the default arm, sensors or skin was set by the experiment, and stays.
-    """
-    if not name:
-        return parts
-    usual = plant_params_of(model.description)
-    world = drawn(named_set(name), seed, usual)
-    believed, off = parts.believed, world.misplaced
-    if believed is None and off != Misplacement() and len(parts.skin):
-        believed = misplaced(parts.skin, model, off, seed)
-    plant, ranging = parts.plant, with_own(world.ranging, parts.ranging, RangeFinderParams())
-    return Parts(with_own(world.plant, plant, usual), ranging, parts.skin, believed)
 
 
 def folder_part(name: str) -> str:

@@ -97,10 +97,5 @@ class Ghost:
             self._place = place
             plant.before_each_step(self._move)
 
-    @property
-    def position(self) -> FloatArray:
-        """Centre of the ghost (3,) [m], base frame."""
-        return np.array(self._at)
-
     def _move(self, time: float) -> None:
         self._at[:] = self._place(time)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from pathlib import Path as FilePath
 
@@ -16,19 +16,19 @@ from pretouch.errors import RecordingError
 from pretouch.loop import Cycle, Options, Recorder, run
 from pretouch.profiles import Profile
 from pretouch.recording.run_record import RunRecord, TrueForces, columns_of, contacts_of
-from pretouch.recording.simulation import Truth, truth_of
+from pretouch.recording.simulation import truth_of
 from pretouch.recording.writer import Recording
 from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import brought_to
 from pretouch.sensing.skin import Skin
 from pretouch.sim.hand import Hand, HandScript, PersonArm
 from pretouch.sim.plant import TOUCH_N, Plant, PlantClock, Touch
-from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import SceneSpec, described, fixtures
 from pretouch.sim.touch_sensor import SimulatedTouchSkin, TouchErrors, TouchSensors
 from pretouch.types import ControlStep, FloatArray, Mode
-from pretouch_lab.domain_randomisation import Parts, randomised
+from pretouch_lab.domain_randomisation import Misplacement, drawn, misplaced, named_set, with_own
 from pretouch_lab.run import Row
 
 Trace = tuple[Row, RunRecord]
@@ -67,8 +67,6 @@ class Setup:
     """Called once with plant and units, to register calls before each physics step."""
     start: FloatArray | None = None
     """Joint positions (n,) at the start [rad]; None: those at the start of the path."""
-    controller: Callable[..., Controller] = Controller
-    """Class of the controller, with the arguments of `Controller`."""
 
 
 @dataclass(frozen=True)
@@ -143,14 +141,25 @@ class _TrialRecorder:
         self.steps.append(cycle.step)
         self.hand_position.append(self._hand.position.copy() if self._hand else np.full(3, np.nan))
         if self._recording:
-            self._recording.record(cycle, self._truth())
+            plant = self._plant
+            forces, touches = plant.true_log[self._forces :], plant.touches[self._touches :]
+            self._forces, self._touches = len(plant.true_log), len(plant.touches)
+            self._recording.record(cycle, truth_of(forces, touches, self.hand_position[-1]))
 
-    def _truth(self) -> Truth:
-        """Return the true forces and contacts since the last cycle."""
-        plant = self._plant
-        forces, touches = plant.true_log[self._forces :], plant.touches[self._touches :]
-        self._forces, self._touches = len(plant.true_log), len(plant.touches)
-        return truth_of(forces, touches, self.hand_position[-1])
+
+def randomised(setup: Setup) -> Setup:
+    """Draw arm, sensors and believed places of a setup from its world by its seed; without a world, nothing.
+
+    A value that differs from the default arm, sensors or skin was set by the experiment, and stays.
+    """
+    if not setup.world:
+        return setup
+    usual, believed = plant_params_of(setup.model.description), setup.believed
+    world = drawn(named_set(setup.world), setup.seed, usual)
+    if believed is None and world.misplaced != Misplacement() and len(setup.skin):
+        believed = misplaced(setup.skin, setup.model, world.misplaced, setup.seed)
+    ranging = with_own(world.ranging, setup.ranging, RangeFinderParams())
+    return replace(setup, plant=with_own(world.plant, setup.plant, usual), ranging=ranging, believed=believed)
 
 
 class SimulatedTrial:
@@ -158,17 +167,16 @@ class SimulatedTrial:
 
     def __init__(self, setup: Setup) -> None:
         """Build arm, skin and controller; the seed draws them from the world of the setup, if any."""
-        own = Parts(setup.plant, setup.ranging, setup.skin, setup.believed)
-        parts = randomised(setup.world, setup.seed, setup.model, own)
+        setup = randomised(setup)
         model, scene = setup.model, setup.scene
         begin = brought_to(model, setup.path.point(0.0)) if setup.start is None else setup.start
-        self.plant = Plant(model, scene, parts.plant, begin, setup.seed)
-        units = RangeFinders(self.plant, setup.skin, parts.ranging, setup.seed)
+        self.plant = Plant(model, scene, setup.plant, begin, setup.seed)
+        units = RangeFinders(self.plant, setup.skin, setup.ranging, setup.seed)
         self.hand = Hand(self.plant, setup.hand, setup.person) if setup.hand else None
         if setup.prepare:
             setup.prepare(self.plant, units)
-        believed = setup.skin if parts.believed is None else parts.believed
-        self.controller = setup.controller(model, believed, fixtures(scene), setup.path, setup.profile)
+        believed = setup.skin if setup.believed is None else setup.believed
+        self.controller = Controller(model, believed, fixtures(scene), setup.path, setup.profile)
         self.clock = PlantClock(self.plant, setup.profile.task.control_period_s)
         self.skin: ports.SkinPort = units
         if len(setup.skin.touching):

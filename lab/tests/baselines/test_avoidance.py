@@ -17,14 +17,6 @@ from pretouch_lab.baselines.flacco import Flacco
 FLACCO, DING = Flacco(), Ding()
 
 
-def obstacles_at(points, ee=(0.0, 0.0, 0.0)):
-    points = np.array(points, float).reshape(-1, 3)
-    away = points - np.array(ee)
-    far = np.linalg.norm(away, axis=1)
-    near = no_obstacles(len(points))._replace(point=points, ee_distance=far, link=np.ones(len(points), np.int64))
-    return near._replace(direction=away / far[:, None], body_distance=far)
-
-
 def test_repulsion_by_numbers_is_finite_anywhere():
     # at half of rho the exponent is 0; at 0 it is -6, and 1 / (1 + e^-6) = 0.99752738; at rho it is 6
     speed = FLACCO.v_max_m_s * FLACCO.risk(np.array([0.0, 0.2, 0.4, 1e6, -1e6]))
@@ -43,7 +35,11 @@ def test_repulsion_by_numbers_is_finite_anywhere():
     ids=["nothing", "one point", "the hand's size is taken off", "size of the nearest, way of both", "both sides"],
 )
 def test_the_hand_is_moved_away_from_points(points, size, expected):
-    velocity = replace(FLACCO, size_m=size).velocity(np.zeros(3), obstacles_at(points))
+    points = np.array(points, float).reshape(-1, 3)
+    far = np.linalg.norm(points, axis=1)
+    obstacles = no_obstacles(len(points))._replace(point=points, ee_distance=far, body_distance=far)
+    obstacles = obstacles._replace(link=np.ones(len(points), np.int64), direction=points / far[:, None])
+    velocity = replace(FLACCO, size_m=size).velocity(np.zeros(3), obstacles)
     np.testing.assert_allclose(velocity, expected, atol=1e-12)
 
 

@@ -34,7 +34,7 @@ def test_each_hard_motion_is_long_enough_to_show_that_its_goal_is_reached():
 def test_a_hard_motion_is_within_the_limits_and_as_fast_as_it_says(name):
     arm, motion, until = model(), motion_of(name, 1000, 120.0), 120.0
     times = np.arange(0.0, until, 0.01)
-    q, qd = (np.array(part) for part in zip(*(motion.course.at(time) for time in times), strict=True))
+    q, qd = (np.array(part) for part in zip(*(motion.at(time) for time in times), strict=True))
     assert (q >= arm.q_min).all()
     assert (q <= arm.q_max).all()
     np.testing.assert_allclose(np.gradient(q, times, axis=0)[1:-1], qd[1:-1], atol=0.1)
@@ -57,7 +57,8 @@ def test_a_hard_arm_moves_and_sees_without_a_controller_as_with_one(monkeypatch)
     assert made.stamp[-1] == pytest.approx(61.0, abs=0.05)
 
     def by_controller(what, prepare, command):
-        return record(replace(what, controller=partial(WanderingController, command.__self__)), prepare)
+        monkeypatch.setattr("pretouch_lab.trial.Controller", partial(WanderingController, command.__self__))
+        return record(what, prepare)
 
     monkeypatch.setattr(hard, "record_moved", by_controller)
     controlled, _ = hard_stream(arm, 1003)

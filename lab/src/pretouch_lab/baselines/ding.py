@@ -82,6 +82,5 @@ class Ding(Restriction, name="ding"):
         return Restricted(np.vstack([rows[which], weighted]), np.append(limit[which], 0.0), which, _WEIGHT)
 
 
-_DETECT = MovingThresholds(f_d_n=0.0)
-DING = replace(profile("paper"), name="ding", slow=None, approach=Ding(), detect=_DETECT)
+DING = replace(profile("paper"), name="ding", slow=None, approach=Ding(), detect=MovingThresholds(f_d_n=0.0))
 """The profile `ding`: contact detection ignores proximity, and nothing else slows the arm."""

@@ -84,6 +84,5 @@ class Flacco(Restriction, name="flacco"):
         return lower, upper
 
 
-_DETECT = MovingThresholds(f_d_n=0.0)
-FLACCO = replace(profile("paper"), name="flacco", slow=None, approach=Flacco(), detect=_DETECT)
+FLACCO = replace(profile("paper"), name="flacco", slow=None, approach=Flacco(), detect=MovingThresholds(f_d_n=0.0))
 """The profile `flacco`: contact detection ignores proximity, and nothing else slows the arm."""

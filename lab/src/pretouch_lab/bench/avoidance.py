@@ -113,7 +113,8 @@ def summarise(rows: list[Row]) -> Row:
         `cells`, one for each scenario and contender; `ablations`, cells of `pretouch` unchanged and with one switch off
         at a time, on the same seeds.
     """
-    ended = [row | {"cycle_time_s": _ended(row, "cycle_time_s") if row["timed"] else None} for row in rows]
+    # a time without an end is infinite
+    ended = [row | {"cycle_time_s": (row["cycle_time_s"] or inf) if row["timed"] else None} for row in rows]
     off = [row for row in ended if row["contender"].startswith(WITHOUT)]
     whole = [row for row in ended if not row["contender"].startswith(WITHOUT)]
     played = {(row["scenario"], row["seed"]) for row in off}
@@ -122,11 +123,6 @@ def summarise(rows: list[Row]) -> Row:
         "cells": summary(whole, ("scenario", "family", "contender"), _SPREAD, _TOTALS),
         "ablations": summary(on + off, ("scenario", "family", "contender"), _SPREAD, _TOTALS),
     }
-
-
-def _ended(row: Row, measure: str) -> float:
-    """Return a time [s]; infinite without an end."""
-    return inf if row[measure] is None else float(row[measure])
 
 
 def tables(summary: Row) -> list[TextTable]:

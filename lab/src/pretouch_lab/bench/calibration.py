@@ -1,7 +1,6 @@
 """Errors of the calibration of many random skins in simulation."""
 
 from collections.abc import Sequence
-from functools import lru_cache
 from time import perf_counter
 
 import numpy as np
@@ -15,10 +14,9 @@ from pretouch.calibration.values import CalibrationData, Place, UnitData
 from pretouch.errors import ExperimentError
 from pretouch.loop import Cycle, Options, run
 from pretouch.ports import NoUnits
-from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import SensorUnit
+from pretouch.sensing.unit import LARGEST_COUNT, SensorUnit
 from pretouch.sim.imu import ImuParams, Imus, ImuSample, imu_counts
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
@@ -27,6 +25,7 @@ from pretouch.sim.scene import SceneSpec
 from pretouch.text_table import TextTable
 from pretouch.traces import ImuTrace, JointTrace
 from pretouch.types import FloatArray
+from pretouch_lab.bench.avoidance_scenes import arm as arm_named
 from pretouch_lab.run import Cell, Row
 from pretouch_lab.table import Column, grouped, table
 
@@ -48,7 +47,6 @@ DATA_SHEET = ImuParams(misalignment_deg=0.0)
 """Errors of the sensors. A board glued on at an angle turns the IMU's frame, which no IMU can measure."""
 CLOCK_ERROR_S = 0.02
 """Largest offset of a unit's clock [s]."""
-_LARGEST_COUNT = 32767
 
 
 def trial(arm: str, plan: Plan, cell: Cell, seed: int) -> Row:
@@ -56,7 +54,7 @@ def trial(arm: str, plan: Plan, cell: Cell, seed: int) -> Row:
 
     Each skin has one unit on each link from the second on; the seed draws skin, arm and sensors.
     """
-    model = _model(arm)
+    model = arm_named(arm)
     skin = random_skin(model, seed)
     data = simulate(model, skin, plan, seed, links_known=not cell["find_links"])
     begin = perf_counter()
@@ -68,11 +66,6 @@ def trial(arm: str, plan: Plan, cell: Cell, seed: int) -> Row:
         for unit, answer, late in zip(skin.units, answers, clock_errors(len(skin), seed).tolist(), strict=True)
     ]
     return {"units": units, "compute_s": took}
-
-
-@lru_cache
-def _model(arm: str) -> RobotModel:
-    return RobotModel(robot_named(arm))
 
 
 def place_row(model: RobotModel, unit: SensorUnit, place: Place, late: float) -> Row:
@@ -125,7 +118,7 @@ def simulate(
     joints, begin = _followed(plant, model, plan)
     number, time = (np.array([getattr(sample, name) for sample in samples]) for name in ("unit", "time"))
     values = np.array([sample.counts for sample in samples]).reshape(-1, 6) * imu_counts(imu)
-    largest, late = _LARGEST_COUNT * imu_counts(imu), clock_errors(len(skin), seed, clock_error_s) - begin
+    largest, late = LARGEST_COUNT * imu_counts(imu), clock_errors(len(skin), seed, clock_error_s) - begin
     units = []
     for k, unit in enumerate(skin.units):
         own = number == k

@@ -116,7 +116,9 @@ def judged_contacts(steps: Steps, touches: list[Touching], contender: Contender)
     stream, replayed = steps.stream, steps.replay(contender)
     matches = matched(touches, stream.stamp, replayed.onsets())
     swept = [matched(touches, stream.stamp, replayed.onsets(value)) for value in sweep_values(contender)]
-    noise = quiet_spread(stream, touches[0].start)
+    # spread of each joint's torque in free motion before the first contact, once the arm has moved for a while
+    quiet = (stream.stamp >= 0.5 * touches[0].start) & (stream.stamp < touches[0].start)
+    noise = stream.robot["tau_ext"][quiet].std(axis=0)
     contacts = [
         {
             **about(touch, stream, noise),
@@ -147,15 +149,6 @@ def matched(touches: list[Touching], stamp: FloatArray, onsets: list[int]) -> li
         else:
             matches.append((None, None))
     return matches
-
-
-def quiet_spread(stream: Stream, until: float) -> FloatArray:
-    """Standard deviation (n,) of each joint's external torque [Nm] in the second half of the time before `until` [s].
-
-    This is the free motion before the first contact of the same arm.
-    """
-    quiet = (stream.stamp >= 0.5 * until) & (stream.stamp < until)
-    return np.asarray(stream.robot["tau_ext"][quiet].std(axis=0))
 
 
 def about(touch: Touching, stream: Stream, noise: FloatArray) -> dict[str, Any]:

@@ -31,14 +31,15 @@ _NEAR = {"nobody near": "nothing", "somebody standing": "standing", "somebody pa
 def results(rows: list[Row]) -> Row:
     """Return the numbers of the benchmark from a row for each arm and detector."""
     free, touched, hard = (arms_of(rows, family) for family in FAMILIES)
-    contacts = contacts_of(touched)
+    contacts, replayed, compared = contacts_of(touched), {"ablated": True}, (DETECTORS[-1], *ablated())
     return {
         "resolution": resolution(free),
         "rows": [
             *free_rows(free, DETECTORS, free_groups()),
             *contact_rows(contacts, DETECTORS, contact_groups(contacts)),
             *hard_rows(hard, DETECTORS),
-            *ablation_rows(free, touched),
+            *free_rows(group(free, replayed), compared, {ABLATED_FREE: {}}),
+            *contact_rows(group(contacts, replayed), compared, {ABLATED_CONTACTS: {"goal": True}}),
         ],
         "curves": curves(free, contacts),
     }
@@ -159,16 +160,6 @@ def hard_rows(arms: list[Row], contenders: Sequence[Contender]) -> list[Row]:
     touched = {name.replace("hard", "hard, touched"): where | {"detectable": True} for name, where in groups.items()}
     free = [row for row in arms if row["near"] != "touched"]
     return [*free_rows(free, contenders, groups), *contact_rows(contacts_of(arms), contenders, touched)]
-
-
-def ablation_rows(free: list[Row], touched: list[Row]) -> list[Row]:
-    """Return the rows of `pretouch` and its ablations on the arms that ablations replay."""
-    compared = (DETECTORS[-1], *ablated())
-    arms, contacts = group(free, {"ablated": True}), contacts_of(group(touched, {"ablated": True}))
-    return [
-        *free_rows(arms, compared, {ABLATED_FREE: {}}),
-        *contact_rows(contacts, compared, {ABLATED_CONTACTS: {"goal": True}}),
-    ]
 
 
 def curves(free: list[Row], contacts: list[Row]) -> list[Row]:

@@ -11,7 +11,7 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.types import FloatArray
 from pretouch_lab.bench.contacts import Toucher, Touching, last_s, place_on
 from pretouch_lab.bench.dense_skin import gap
-from pretouch_lab.bench.motions import LoadedMotion, motion_of
+from pretouch_lab.bench.motions import Wandering, motion_of
 from pretouch_lab.bench.scenes import ArmCell, model, path_of, scenario, sensing_of
 from pretouch_lab.bench.streams import AWAY, PROFILE, Alone, Stream, record_moved
 from pretouch_lab.replay import Place
@@ -34,7 +34,7 @@ def hard_stream(arm: ArmCell, seed: int) -> tuple[Stream, list[Touching]]:
     touches = _touched(motion, arm.count, seed)
     radius = sensing.hand_radius if touches else family["near"]["radius_m"]
     end_s, speed = last_s(touches) if touches else start + arm.counted_s, profile(PROFILE).task.speed_m_s
-    units, q = None if arm.near == "nothing" else sensing, motion.course.at(0.0)[0]
+    units, q = None if arm.near == "nothing" else sensing, motion.at(0.0)[0]
     what = Alone(path_of("rest"), speed, PlantParams(), units, radius, seed, end_s, WORLD, q)
 
     def prepare(plant: Plant) -> Place:
@@ -43,10 +43,10 @@ def hard_stream(arm: ArmCell, seed: int) -> tuple[Stream, list[Touching]]:
             return Toucher(plant, touches).hand
         return _beside(motion, seed) if arm.near == "standing" else AWAY
 
-    return record_moved(what, prepare, motion.course.command), touches
+    return record_moved(what, prepare, motion.command), touches
 
 
-def _gripping(plant: Plant, motion: LoadedMotion) -> Callable[[float], float]:
+def _gripping(plant: Plant, motion: Wandering) -> Callable[[float], float]:
     """Return a function that grips and puts down the motion's loads at their times."""
     waiting = list(motion.loads)
 
@@ -58,11 +58,11 @@ def _gripping(plant: Plant, motion: LoadedMotion) -> Callable[[float], float]:
     return grip
 
 
-def _beside(motion: LoadedMotion, seed: int) -> FloatArray:
+def _beside(motion: Wandering, seed: int) -> FloatArray:
     """Draw a place (3,) [m] for a bystander: the first within the range of distances, or else the nearest to it."""
     near, rng, body = scenario("hard")["near"], np.random.default_rng([seed, 62]), model().body
-    times = np.linspace(0.0, float(motion.course.start[-1]), _LOOKED_AT)
-    swept = [placed(body, model().kinematics(motion.course.at(time)[0])) for time in times]
+    times = np.linspace(0.0, float(motion.start[-1]), _LOOKED_AT)
+    swept = [placed(body, model().kinematics(motion.at(time)[0])) for time in times]
     low, high = near["gap_m"]
     smallest, best = np.inf, AWAY
     for _ in range(_TRIES):
@@ -76,14 +76,14 @@ def _beside(motion: LoadedMotion, seed: int) -> FloatArray:
     return best
 
 
-def _touched(motion: LoadedMotion, number: int, seed: int) -> list[Touching]:
+def _touched(motion: Wandering, number: int, seed: int) -> list[Touching]:
     """Draw the contacts of an arm: the seed decides places, forces and times."""
     family, rng, arm = scenario("hard"), np.random.default_rng([seed, 63]), model()
     chosen, hand = family["contact"], scenario("contacts")["hand"]
     radius, at, touches = sensing_of("nominal", seed).hand_radius, float(family["duration"]["warm_up_s"]), []
     for _ in range(number):
         link = arm.link_index(f"{arm.description.name}_{chosen['links'][int(rng.integers(len(chosen['links'])))]}")
-        point, normal = place_on(link, motion.course.at(at)[0], radius, rng, hand["from_m"])
+        point, normal = place_on(link, motion.at(at)[0], radius, rng, hand["from_m"])
         inwards = chosen["tilt"] * rng.uniform(-1, 1, 3) - normal
         inwards /= np.linalg.norm(inwards)
         force, duration = float(rng.choice(chosen["forces_n"])), float(rng.choice(chosen["durations_s"]))

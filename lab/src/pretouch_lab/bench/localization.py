@@ -95,9 +95,9 @@ def replayed(stream: Stream, touches: list[Touching], skin: str) -> Row:
     detector = DetectorAlone(params, arm)
     learning_s = scenario("localization")["duration"]["warm_up_s"] - 1.0
     rows: list[Row] = [{"link": name_of(t.link), "force_n": t.force_n, "duration_s": t.duration_s} for t in touches]
-    due = sorted(
-        (t.start + s, k, at) for k, t in enumerate(touches) for at, s in (("", judged_s(t)), ("_end", t.duration_s))
-    )
+    soon_s = scenario("localization")["judged"]["after_s"]
+    ends = [(("", min(soon_s, t.duration_s)), ("_end", t.duration_s)) for t in touches]
+    due = sorted((t.start + s, k, at) for k, t in enumerate(touches) for at, s in ends[k])
     took_s, before = [], None
     for robot, obstacles, _, watched in stream.steps():
         while due and before is not None and robot.stamp > due[0][0] + 1e-9:
@@ -111,11 +111,6 @@ def replayed(stream: Stream, touches: list[Touching], skin: str) -> Row:
         before = detection.touched, robot.q, detector.state.test.model.spread
     median, p99 = (rounded(float(np.percentile(took_s or [np.nan], percent)), 7) for percent in (50, 99))
     return {"contacts": rows, "median_s": median, "p99_s": p99}
-
-
-def judged_s(touch: Touching) -> float:
-    """Time from the start of a contact to its judgement [s]: the scenario file's, but at most its duration."""
-    return float(min(scenario("localization")["judged"]["after_s"], touch.duration_s))
 
 
 @cache

@@ -26,7 +26,7 @@ Rng = np.random.Generator
 
 @dataclass(frozen=True)
 class Wandering:
-    """M moves from rest to rest, one after the other."""
+    """M moves from rest to rest, one after the other, and the loads that the arm grips and puts down."""
 
     q: FloatArray
     """(M + 1, n) postures [rad]."""
@@ -34,6 +34,8 @@ class Wandering:
     """(M,) start of each move [s]."""
     duration: FloatArray
     """(M,) duration of each move [s]."""
+    loads: tuple[tuple[float, float], ...] = ()
+    """Times [s] and the load from then on [kg]."""
 
     def at(self, time: float) -> tuple[FloatArray, FloatArray]:
         """Return joint positions (n,) [rad] and velocities (n,) [rad/s] at a time [s]."""
@@ -78,26 +80,17 @@ def is_free(q: FloatArray) -> bool:
     return True
 
 
-@dataclass(frozen=True)
-class LoadedMotion:
-    """A course of the joints, with the loads that the arm grips and puts down."""
-
-    course: Wandering
-    loads: tuple[tuple[float, float], ...] = ()
-    """Times [s] and the load from then on [kg]."""
-
-
-def motion_of(name: str, seed: int, until: float) -> LoadedMotion:
+def motion_of(name: str, seed: int, until: float) -> Wandering:
     """Draw a motion of the named kind until a time [s] from the seed."""
     rng = np.random.default_rng([seed, 61])
     if name in ("pick-and-place", "untold-load"):
         return _pick_and_place(scenario("hard")["motion"][name], rng, until)
-    return LoadedMotion(_course(scenario("hard")["motion"][name], _NEXT[name], rng, until))
+    return _course(scenario("hard")["motion"][name], _NEXT[name], rng, until)
 
 
 def wandering(seed: int, until: float) -> Wandering:
     """Draw the motion of a wandering arm until a time [s] from the seed."""
-    return _course(scenario("localization")["motion"], _anywhere, np.random.default_rng([seed, 41]), until)
+    return _course(scenario("localization")["motion"], _NEXT["random"], np.random.default_rng([seed, 41]), until)
 
 
 Next = Callable[[FloatArray, dict[str, Any], Rng], list[FloatArray]]
@@ -121,17 +114,9 @@ _SHORTEST_S = 0.15
 """Shortest move [s], as in jogging."""
 
 
-def _anywhere(q: FloatArray, _chosen: dict[str, Any], rng: Rng) -> list[FloatArray]:
-    return [posture(rng, q)]
-
-
 def _one_joint(q: FloatArray, chosen: dict[str, Any], rng: Rng) -> list[FloatArray]:
     turned = np.eye(len(q))[rng.integers(len(q))] * rng.choice([-1.0, 1.0])
     return [_free_of(q, lambda: q + turned * rng.uniform(*chosen["way_rad"]))]
-
-
-def _a_little(q: FloatArray, chosen: dict[str, Any], rng: Rng) -> list[FloatArray]:
-    return [_free_of(q, lambda: q + rng.uniform(-1.0, 1.0, len(q)) * rng.uniform(*chosen["way_rad"]))]
 
 
 def _with_stops(q: FloatArray, chosen: dict[str, Any], rng: Rng) -> list[FloatArray]:
@@ -152,15 +137,16 @@ def _free_of(q: FloatArray, draw: Callable[[], FloatArray]) -> FloatArray:
 
 
 _NEXT: dict[str, Next] = {
-    "random": _anywhere,
-    "standing": _anywhere,
+    **dict.fromkeys(("random", "standing"), lambda q, _chosen, rng: [posture(rng, q)]),
     "jogging": _one_joint,
     "stop-and-go": _with_stops,
-    "teleoperation": _a_little,
+    "teleoperation": lambda q, chosen, rng: [
+        _free_of(q, lambda: q + rng.uniform(-1.0, 1.0, len(q)) * rng.uniform(*chosen["way_rad"]))
+    ],
 }
 
 
-def _pick_and_place(chosen: dict[str, Any], rng: Rng, until: float) -> LoadedMotion:
+def _pick_and_place(chosen: dict[str, Any], rng: Rng, until: float) -> Wandering:
     """Return a motion to and fro between two places, with a load gripped at one and put down at the other."""
     hand, arm = model().ee, model()
     places = [
@@ -183,4 +169,4 @@ def _pick_and_place(chosen: dict[str, Any], rng: Rng, until: float) -> LoadedMot
             if number in (1, 4):
                 loads.append((at + duration[-1] + 0.5 * rest, kg if number == 1 else 0.0))
             at += duration[-1] + rest
-    return LoadedMotion(Wandering(np.array(q), np.array(start), np.array(duration)), tuple(loads))
+    return Wandering(np.array(q), np.array(start), np.array(duration), tuple(loads))

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from pretouch.control.path import Path as TaskPath
-from pretouch.controller import Controller
 from pretouch.line import SEE
 from pretouch.loop import Cycle, instant
 from pretouch.modes import CLEAR
@@ -117,14 +116,9 @@ class StreamRecorder:
         near = Obstacles._make(np.concatenate(parts) for parts in zip(*self._obstacles, strict=True))
         count = np.array([len(o.unit) for o in self._obstacles], dtype=np.int64)
         reacting, watched = np.array(self._flags, dtype=np.float64).T
-        return Stream(_fields_of(self._robot), reacting.copy(), watched.copy(), count, near)
-
-
-def _fields_of(rows: list[FloatArray]) -> dict[str, FloatArray]:
-    """Split states of the robot, each with its fields in one array, into arrays by field."""
-    n, every = model().n, np.array(rows)
-    fields = np.split(every, np.cumsum([1, n, n, n, n, n]), axis=1)
-    return dict(zip(_ROBOT, (fields[0][:, 0].copy(), *(part.copy() for part in fields[1:])), strict=True))
+        stamp, *fields = np.split(np.array(self._robot), np.cumsum([1, *[model().n] * 5]), axis=1)
+        robot = dict(zip(_ROBOT, (stamp[:, 0].copy(), *(part.copy() for part in fields)), strict=True))
+        return Stream(robot, reacting.copy(), watched.copy(), count, near)
 
 
 Prepare = Callable[[Plant], Place]
@@ -150,8 +144,6 @@ class Alone:
     """Set of the domain randomisation that the seed draws from; empty: none."""
     start: FloatArray | None = None
     """Joint positions (n,) at the start [rad]; None: those at the start of the path."""
-    controller: Callable[..., Controller] = Controller
-    """Class of the controller, with the arguments of `Controller`."""
 
     def simulation(self, prepare: Callable[[Plant, RangeFinders], object]) -> SimulatedTrial:
         """Build the simulated arm."""
@@ -170,7 +162,6 @@ class Alone:
                 world=self.world,
                 prepare=prepare,
                 start=self.start,
-                controller=self.controller,
             )
         )
 
@@ -179,12 +170,10 @@ class Alone:
         return stamp >= self.end_s - 0.5 * TaskParams().control_period_s
 
 
-def record(what: Alone, prepare: Prepare, look: Callable[[Plant, Ghost, Cycle], None] | None = None) -> Stream:
-    """Simulate an arm until its end and return its stream; `look(plant, ghost, cycle)` is called in each cycle."""
-    ghosts: list[Ghost] = []
-    simulation = what.simulation(lambda plant, _: ghosts.append(Ghost(plant, prepare(plant))))
-    plant = simulation.plant
-    recorder = StreamRecorder(plant, (lambda cycle: look(plant, ghosts[0], cycle)) if look else None)
+def record(what: Alone, prepare: Prepare) -> Stream:
+    """Simulate an arm until its end and return its stream."""
+    simulation = what.simulation(lambda plant, _: Ghost(plant, prepare(plant)))
+    recorder = StreamRecorder(simulation.plant)
     simulation.run(recorder, lambda step: what.is_over(step.stamp))
     return recorder.stream()
 

@@ -83,9 +83,9 @@ def _show(result: "IdentifiedArm", model: "RobotModel", source: str) -> None:
     for line in (f"{source}. {result.seconds:.0f} s of free motion are used.", *result.notes):
         console.print(line, markup=False)
     rows = result.of_joints()
-    columns = [
-        [_shown(*each) for each in zip(row.values, row.standard_errors, row.identified, strict=True)] for row in rows
-    ]
+    texts = ("({:.3g} +- {:.1g})", "{:.3g} +- {:.1g}")
+    numbers = [zip(row.identified, row.values, row.standard_errors, strict=True) for row in rows]
+    columns = [[texts[int(sure)].format(*number) for sure, *number in each] for each in numbers]
     table = [[joint, *cells] for joint, *cells in zip(model.joints, *columns, strict=True)]
     console.print(PlainTable(["joint", *(row.name for row in rows)], table), crop=False)
     payload, error = result.fit.payload
@@ -104,11 +104,6 @@ def _show(result: "IdentifiedArm", model: "RobotModel", source: str) -> None:
     )
     for line in lines:
         console.print(line, markup=False)
-
-
-def _shown(number: float, error: float, identified: bool) -> str:
-    text = f"{number:.3g} +- {error:.1g}"
-    return text if identified else f"({text})"
 
 
 def _numbers(result: "IdentifiedArm", model: "RobotModel", source: str) -> dict[str, Any]:

@@ -253,10 +253,9 @@ def _met(rows: list[Row], by: Sequence[str]) -> list[Row]:
     ]
 
 
-def shown_cells(rows: list[Row]) -> list[Row]:
-    """Return the trial of the figure: one with the hand beside the path."""
+def _beside(rows: list[Row]) -> list[Row]:
     return first_sensing([row for row in rows if row["place"] == "beside"])
 
 
-_FIGURE = Drawing("circle", "End-effector path with a hand beside it", shown_cells)
+_FIGURE = Drawing("circle", "End-effector path with a hand beside it", _beside)
 EXPERIMENT = Experiment("avoidance", cells, trial, tables, _FIGURE, any_arm=True)

@@ -8,7 +8,7 @@ from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.text_table import TextTable
 from pretouch.types import ControlStep
 from pretouch_lab.experiment import Context, Drawing, Experiment, controllers, first_sensing
-from pretouch_lab.options import TrialOptions
+from pretouch_lab.experiments.dynamic import NOTICE_S, REBOUND_S
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, medians, rounded
 from pretouch_lab.trial import Record, play
@@ -30,16 +30,7 @@ _FACE = FACES[0]
 """Right face of the robot's hand, pushed along +y of the base."""
 _FORCE_N = (15.0, 30.0)
 _LASTING_S = (0.2, 0.5)
-_NOTICE_S = 0.3
-"""Longest time from the release to a reaction to the push [s]."""
-_REBOUND_S = 3.0
-"""Longest time from the release to a repeated reaction, the push's echo [s]."""
 _Y = 1
-
-
-def cells(options: TrialOptions) -> list[Row]:
-    """Return a cell for each controller."""
-    return controllers(options, "slack")
 
 
 def interaction(seed: int) -> tuple[Box, Push]:
@@ -76,7 +67,7 @@ def results(record: Record, touched: tuple[float, float] | None) -> Row:
     """Return the measures of a trial; `touched` is touch and release [s] of the push, None without contact."""
     touch, release = touched or (np.inf, np.inf)
     before = [s for s in record.steps if s.armed and s.stamp < touch]
-    answer = next((s for s in record.reactions() if touch <= s.stamp <= release + _NOTICE_S), None)
+    answer = next((s for s in record.reactions() if touch <= s.stamp <= release + NOTICE_S), None)
     return {
         "contact": touched is not None,
         "both_lowered": any(map(lowered_on_both_sides, before)),
@@ -85,7 +76,7 @@ def results(record: Record, touched: tuple[float, float] | None) -> Row:
         "detection_delay_s": None if answer is None else rounded(answer.stamp - touch, 4),
         "filtered_at_detection_n": None if answer is None else rounded(float(answer.filtered_force[_Y])),
         "raw_at_detection_n": None if answer is None else rounded(float(answer.force[_Y])),
-        "false_detections": sum(not touch <= s.stamp <= release + _REBOUND_S for s in record.reactions()),
+        "false_detections": sum(not touch <= s.stamp <= release + REBOUND_S for s in record.reactions()),
         "held": record.held(),
     }
 
@@ -117,4 +108,4 @@ def tables(rows: list[Row]) -> list[TextTable]:
 
 
 _FIGURE = Drawing("close-up", "Distances and thresholds with objects on both sides", first_sensing)
-EXPERIMENT = Experiment("between", cells, trial, tables, _FIGURE)
+EXPERIMENT = Experiment("between", lambda options: controllers(options, "slack"), trial, tables, _FIGURE)

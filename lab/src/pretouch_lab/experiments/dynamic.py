@@ -9,21 +9,15 @@ from pretouch.text_table import TextTable
 from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray
 from pretouch_lab.experiment import Context, Drawing, Experiment, controllers, first_sensing
-from pretouch_lab.options import TrialOptions
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, peak, rounded, summary, table
 from pretouch_lab.trial import Record, play
 
 _DURATION_S = 30.0
-_NOTICE_S = 0.3
+NOTICE_S = 0.3
 """Longest time from the release to a reaction to the push [s]."""
-_REBOUND_S = 3.0
+REBOUND_S = 3.0
 """Longest time from the release to a repeated reaction, the push's echo [s]."""
-
-
-def cells(options: TrialOptions) -> list[Row]:
-    """Return a cell for each controller."""
-    return controllers(options, "slack")
 
 
 def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
@@ -35,6 +29,8 @@ def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
     beginnings, spans = record.beginnings(), [span for span in person.contacts if span is not None]
     reactions = [step for step, _ in beginnings]
     missing = [None] * (len(person.pushes) - len(person.contacts))
+    pushed = [s for s in record.steps if any(a <= s.stamp <= b for a, b in spans)]
+    estimate = np.array([np.linalg.norm(s.force) for s in pushed])
     row = {
         "contact": bool(spans),
         **_at_detection(reactions, spans),
@@ -42,10 +38,10 @@ def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
             _contact(record, beginnings, push, touched)
             for push, touched in zip(person.pushes, [*person.contacts, *missing], strict=True)
         ],
-        "peak_estimate_n": rounded(peak(_touched_estimate(record, spans))),
+        "peak_estimate_n": rounded(peak(estimate[np.isfinite(estimate)])),
         "true_peak_20ms_n": rounded(peak(mean_over(true, 20))),
         "true_peak_n": rounded(peak(true)),
-        "false_detections": sum(not any(a <= s.stamp <= b + _REBOUND_S for a, b in spans) for s in reactions),
+        "false_detections": sum(not any(a <= s.stamp <= b + REBOUND_S for a, b in spans) for s in reactions),
         "held": record.held(),
     }
     return row, record
@@ -53,7 +49,7 @@ def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
 
 def _at_detection(reactions: list[ControlStep], spans: list[tuple[float, float]]) -> dict[str, float | None]:
     """Return medians over detected pushes: delay [s], and norms of the filtered and the raw estimate [N]."""
-    reached = [(s, next((a for a, b in spans if a <= s.stamp <= b + _NOTICE_S), None)) for s in reactions]
+    reached = [(s, next((a for a, b in spans if a <= s.stamp <= b + NOTICE_S), None)) for s in reactions]
     rows = [
         (s.stamp - touch, float(np.linalg.norm(s.filtered_force)), float(np.linalg.norm(s.force)))
         for s, touch in reached
@@ -62,13 +58,6 @@ def _at_detection(reactions: list[ControlStep], spans: list[tuple[float, float]]
     names = ("detection_delay_s", "filtered_at_detection_n", "raw_at_detection_n")
     medians = np.median(np.array(rows), axis=0).tolist() if rows else [None] * len(names)
     return {name: None if v is None else rounded(v, 4) for name, v in zip(names, medians, strict=True)}
-
-
-def _touched_estimate(record: Record, spans: list[tuple[float, float]]) -> FloatArray:
-    """Return the norms of the force estimate [N] in the control steps of the pushes, NaN left out."""
-    steps = [s for s in record.steps if any(a <= s.stamp <= b for a, b in spans)]
-    size = np.array([np.linalg.norm(s.force) for s in steps])
-    return size[np.isfinite(size)]
 
 
 def _contact(
@@ -87,11 +76,11 @@ def _contact(
         return row | {"push_s": 0.0}
     touch, release = touched
     later = [t.time for t in record.touches if t.time > release]  # the floor, say: answered by itself
-    end = min([release + _REBOUND_S, *later])
+    end = min([release + REBOUND_S, *later])
     answers = [(s, v) for s, v in beginnings if touch <= s.stamp <= end]
     pushed = _mean_force(record, touch, release)
     row["reaction_towards_person"] = any(float(v @ pushed) < 0 for _, v in answers)
-    if answers and answers[0][0].stamp <= release + _NOTICE_S:
+    if answers and answers[0][0].stamp <= release + NOTICE_S:
         first, velocity = answers[0]
         row |= {"detected": True, "delay_s": rounded(first.stamp - touch, 4)}
         angle = angle_deg(velocity, _mean_force(record, max(touch, first.stamp - 0.05), first.stamp))
@@ -138,4 +127,4 @@ def tables(rows: list[Row]) -> list[TextTable]:
 
 
 _FIGURE = Drawing("interaction", "Distances, force with thresholds, velocity over thirty seconds", first_sensing)
-EXPERIMENT = Experiment("dynamic", cells, trial, tables, _FIGURE, any_arm=True)
+EXPERIMENT = Experiment("dynamic", lambda options: controllers(options, "slack"), trial, tables, _FIGURE, any_arm=True)

@@ -23,6 +23,7 @@ AXES = "xyz"
 Y = 1
 """Axis in the paper's figures."""
 _SLOWED = 0.99
+"""Speed factor below which the arm counts as slowed."""
 Look = dict[str, Any]
 _COLOURS = ("black", "tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple", "tab:gray")
 _LINES, _MARKERS = ("-", "--", "-", ":", "-.", "--", "-"), ("", "", "o", "s", "", "^", "")
@@ -41,11 +42,6 @@ def shade(axes: Axes, time: FloatArray, flags: BoolArray, colour: str, hatch: st
 def near(trace: RunRecord, d_max: float) -> BoolArray:
     """Return flags (S,) of the steps with an obstacle within d_max [m] of the end-effector's origin."""
     return np.asarray(np.linalg.norm(trace.nearest_point - trace.ee_position, axis=1) < d_max)
-
-
-def slowed(trace: RunRecord) -> BoolArray:
-    """Return flags (S,) of the steps in which the arm is slowed."""
-    return trace.speed_scale < _SLOWED
 
 
 def touching(trace: RunRecord) -> BoolArray:
@@ -94,7 +90,7 @@ def circle(traces: list[Trace], _units: tuple[str, ...]) -> Figure:
     figure = Figure(figsize=(9, 9), layout="constrained")
     plane, course, aside = figure.subplots(3, 1, height_ratios=[1.9, 0.8, 0.6])
     off = np.linalg.norm(trace.ee_position - trace.path_position, axis=1)
-    disturbed = slowed(trace) | (off > _OFF_PATH_M)
+    disturbed = (trace.speed_scale < _SLOWED) | (off > _OFF_PATH_M)
     avoiding = disturbed & near(trace, profile.d_max_m)
     recovering = disturbed & ~avoiding
     _plane(plane, trace, avoiding, recovering, profile)
@@ -155,7 +151,7 @@ def interaction(traces: list[Trace], units: tuple[str, ...]) -> Figure:
     bottom.plot(trace.time, trace.ee_velocity[:, Y], color="black", lw=1, label="end-effector")
     bottom.set(ylabel=f"velocity along {AXES[Y]} [m/s]", xlabel="time [s]", xlim=(trace.time[0], trace.time[-1]))
     for axes in (top, middle, bottom):
-        shade(axes, trace.time, slowed(trace) & ~trace.reacting, "tab:blue", label="slowed")
+        shade(axes, trace.time, (trace.speed_scale < _SLOWED) & ~trace.reacting, "tab:blue", label="slowed")
         shade(axes, trace.time, trace.reacting | touching(trace), "tab:red", "////", label="contact and reaction")
         axes.grid(alpha=0.3)
     top.legend(loc="upper right", fontsize="x-small", ncols=5)

@@ -69,11 +69,12 @@ def results(record: Record, push: float, links: tuple[str, ...]) -> Row:
     """
     touch = record.first_contact()
     reactions = record.reactions()
+    sensed = min((float(s.obstacles.body_distance.min(initial=np.inf)) for s in record.steps), default=np.inf)
     row: Row = {
         "contact": touch is not None,
         "touched_link": None,
         **dict.fromkeys(MEASURES),
-        "least_sensed_m": least_sensed(record),
+        "least_sensed_m": rounded(sensed, 4) if np.isfinite(sensed) else None,
         "false_detections": sum(touch is None or s.stamp < touch for s in reactions),
         "held": record.held(),
     }
@@ -93,12 +94,6 @@ def results(record: Record, push: float, links: tuple[str, ...]) -> Row:
         row["filtered_at_detection_n"] = rounded(push * float(detection.filtered_force[1]))
         row["raw_at_detection_n"] = rounded(push * float(detection.force[1]))
     return row
-
-
-def least_sensed(record: Record) -> float | None:
-    """Return the least distance [m] of a sensed point from the arm's surface, None without a point."""
-    least = min((float(s.obstacles.body_distance.min(initial=np.inf)) for s in record.steps), default=np.inf)
-    return rounded(least, 4) if np.isfinite(least) else None
 
 
 _FORCES = (
