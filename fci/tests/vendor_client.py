@@ -35,9 +35,11 @@ _FIELDS = (
 
 def _told(state):
     """All that a state tells."""
-    told = {name: _plain(getattr(state, name)) for name in _FIELDS}
+    values = {name: getattr(state, name) for name in _FIELDS}
+    told = {k: list(map(float, v)) if hasattr(v, "__iter__") else float(v) for k, v in values.items()}
     mode, time = str(state.robot_mode).rpartition(".")[2], state.time.to_sec()
-    errors = {name: _names(getattr(state, name)) for name in ("current_errors", "last_motion_errors")}
+    errors = {name: getattr(state, name) for name in ("current_errors", "last_motion_errors")}
+    errors = {k: sorted(n for n in dir(v) if n[0] != "_" and getattr(v, n) is True) for k, v in errors.items()}
     return {"mode": mode.removeprefix("k").lower(), "time": time, **errors, **told}
 
 
@@ -45,14 +47,6 @@ def _fresh(robot):
     """A state sent after the last request was answered: the first that is read may have been on its way before."""
     robot.read_once()
     return _told(robot.read_once())
-
-
-def _plain(value):
-    return list(map(float, value)) if hasattr(value, "__iter__") else float(value)
-
-
-def _names(errors):
-    return sorted(name for name in dir(errors) if not name.startswith("_") and getattr(errors, name) is True)
 
 
 _COMMANDS = {

@@ -24,10 +24,6 @@ SMALL = Problem(np.eye(N), -0.5 * ONE, -ONE, ONE, np.eye(N)[:2], np.full(2, 0.1)
 """|x - 0.5|^2 / 2 within +-1, and x_0, x_1 <= 0.1."""
 
 
-def weighted(soft: bool) -> float | None:
-    return WEIGHT if soft else None
-
-
 def assert_none(answer: QpSolution, outcome: QpOutcome, status: str = "") -> None:
     """There is no answer, for this reason; weights of what contradicts are numbers all the same."""
     assert answer.outcome is outcome
@@ -255,7 +251,7 @@ def test_nothing_that_is_not_finite_gets_through(part: str, value: float, soft: 
     for at in (0, 1, -1):
         wrong = getattr(SMALL, part).copy()
         wrong.flat[at] = value
-        answer = answered(replace(SMALL, weight=weighted(soft), **{part: wrong}))
+        answer = answered(replace(SMALL, weight=WEIGHT if soft else None, **{part: wrong}))
         assert_none(answer, QpOutcome.FAILED, "not finite")
 
 

@@ -25,10 +25,6 @@ def hand(panda_model, surface):
     return panda_model.moved_by.all(axis=1)[surface.link]
 
 
-def ready(model):
-    return model.description.q_ready[None]
-
-
 def normals(model, surface):
     R = model.kinematics(model.description.q_ready).rotation[surface.link]
     return np.einsum("pij,pj->pi", R, surface.normal)
@@ -36,7 +32,7 @@ def normals(model, surface):
 
 def test_the_hand_meets_what_lies_ahead_as_often_as_its_surface_faces_it(panda_model, surface, hand):
     to = np.array([0.6, 0.0, -0.8])
-    met = ways_met(panda_model, no_fixtures(), PARAMS, ready(panda_model), to[None])
+    met = ways_met(panda_model, no_fixtures(), PARAMS, panda_model.description.q_ready[None], to[None])
     ahead = normals(panda_model, surface) @ to
     came = hand & met.free[0]
     assert 0.1 < came[hand].mean() < 0.6

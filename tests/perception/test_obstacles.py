@@ -76,16 +76,12 @@ def test_a_good_reading_is_taken_within_what_the_sensor_can_measure(distance, sh
 # Which readings tell anything
 
 
-def _tells(status, distance) -> bool:
-    readings = _reading(distance, status)
-    (tells,) = is_informative(*readings, measured(*readings, ONE), ONE)
-    return bool(tells)
-
-
 @pytest.mark.parametrize("status", [*RangeStatus, -1, 8, 300])
 def test_a_target_tells_and_so_does_its_absence_but_no_failure(status):
     for distance, known in ((0.5, True), (100.0, True), (-1.0, False), (NAN, False), (INF, False)):
-        assert _tells(status, distance) == (status in NEAR + NO_TARGET or (known and status in SHOWN))
+        readings = _reading(distance, status)
+        (tells,) = is_informative(*readings, measured(*readings, ONE), ONE)
+        assert tells == (status in NEAR + NO_TARGET or (known and status in SHOWN))
 
 
 # How long a point is kept

@@ -13,22 +13,9 @@ from pretouch.sensing.unit import SensorUnit
 from pretouch.types import RangeReadings, RangeStatus
 
 
-def _left_of_hand(distance: float) -> np.ndarray:
-    """Where the unit hand_left sees something in the ready posture (1, 3) [m]."""
-    return HAND_LEFT[None] + np.array([0.0, distance, 0.0])
-
-
 @pytest.fixture
 def watcher(panda_model, paper_skin):
     return Watcher(panda_model, paper_skin)
-
-
-@pytest.fixture
-def looking_down(panda_model):
-    """A unit 20 mm below the fingertips of the ready posture, on the beam's way to the floor."""
-    T = np.eye(4)
-    T[2, 3] = 0.1034 + 0.03
-    return Watcher(panda_model, Skin([SensorUnit("down", "panda_hand", T)], panda_model))
 
 
 # One obstacle
@@ -37,7 +24,7 @@ def looking_down(panda_model):
 def test_a_reading_becomes_an_obstacle_beside_the_hand(watcher):
     found = watcher.see(1.0, hand_left=0.3)
     np.testing.assert_array_equal(found.unit, [watcher.skin.ids.index("hand_left")])
-    np.testing.assert_allclose(found.point, _left_of_hand(0.3), atol=1e-4)
+    np.testing.assert_allclose(found.point, [HAND_LEFT + [0.0, 0.3, 0.0]], atol=1e-4)
     np.testing.assert_allclose(found.ee_distance, [np.hypot(0.408, 0.0584)], atol=1e-4)
     assert watcher.model.links[found.link[0]] == "panda_hand"
     np.testing.assert_allclose(found.direction, [[0, 1, 0]], atol=0.1)
@@ -71,8 +58,11 @@ def test_a_reading_that_comes_too_late_shows_nothing_and_is_a_report(watcher):
 
 
 @pytest.mark.parametrize(("distance", "shown"), [(0.70, 0), (0.657, 0), (0.60, 0), (0.59, 1), (0.3, 1)])
-def test_the_floor_is_no_obstacle_but_what_stands_on_it_is(looking_down, distance, shown):
-    found = looking_down.see(1.0, down=distance)  # 0.2 m pedestal, 0.457 m below it the fingertips: 0.657 m
+def test_the_floor_is_no_obstacle_but_what_stands_on_it_is(panda_model, distance, shown):
+    T = np.eye(4)
+    T[2, 3] = 0.1034 + 0.03  # 20 mm below the fingertips of the ready posture, on the beam's way to the floor
+    watcher = Watcher(panda_model, Skin([SensorUnit("down", "panda_hand", T)], panda_model))
+    found = watcher.see(1.0, down=distance)  # 0.2 m pedestal, 0.457 m below it the fingertips: 0.657 m
     assert len(found.unit) == shown
     if shown:
         np.testing.assert_allclose(found.point, [TCP - [0, 0, 0.03 + distance]], atol=1e-4)

@@ -69,10 +69,6 @@ def any_like(rng: np.random.Generator, value: Any) -> Any:
     return value if value is None else float(any_like(rng, np.array([value]))[0])
 
 
-def any_rows(rng: np.random.Generator) -> np.ndarray:
-    return any_like(rng, np.zeros(rng.integers(9)))
-
-
 @pytest.fixture(scope="module")
 def run(controller):
     run = Run(controller, seed=3)
@@ -84,7 +80,7 @@ def run(controller):
 @given(SEED, st.integers(-1, 2**62))
 def test_inputs_come_back_to_the_bit_whatever_their_lengths(seed, points_at):
     rng = np.random.default_rng(seed)
-    rows = [any_rows(rng) for _ in range(7)]
+    rows = [any_like(rng, np.zeros(rng.integers(9))) for _ in range(7)]
     wrench = (None, *(any_like(rng, np.zeros(n)) for n in (0, 6, 7)))[rng.integers(4)]
     readings = RangeReadings(*rows[5:], rng.integers(-(2**63), 2**63, rng.integers(9)))
     inputs = any_like(rng, Inputs(0.0, RobotState(0.0, *rows[:5], wrench), readings, False))

@@ -32,14 +32,9 @@ def place(controller, tmp_path_factory):
     return place
 
 
-@pytest.fixture
-def made(place):
-    return open_recording(place)
-
-
-def test_a_run_is_recomputed_bit_for_bit(made):
+def test_a_run_is_recomputed_bit_for_bit(place):
     done = []
-    verdict = verify(made, done.append)
+    verdict = verify(open_recording(place), done.append)
     assert verdict.agrees
     assert verdict.exact
     assert (verdict.steps, verdict.checked, verdict.skipped, verdict.differing) == (320, 320, {}, 0)

@@ -158,16 +158,6 @@ def aged(by: float) -> Callable[[Inputs], Inputs]:
     return lambda inputs: replace(inputs, robot=replace(inputs.robot, stamp=inputs.robot.stamp - by))
 
 
-def back(by: float) -> Callable[[Inputs], Inputs]:
-    """Let the clock stand earlier in one cycle."""
-    return lambda inputs: replace(inputs, stamp=inputs.stamp - by)
-
-
-def no_time(inputs: Inputs) -> Inputs:
-    """Lose the instant of the step."""
-    return replace(inputs, stamp=np.nan)
-
-
 def broken_units(inputs: Inputs) -> Inputs:
     """Readings of all kinds that cannot be: no numbers, negative, infinite, from the future."""
     r = inputs.readings
@@ -239,8 +229,9 @@ SCENES = (
           change={90: spoilt("wrench", 1, np.inf), 91: spoilt("wrench", 4, np.nan), 92: spoilt("wrench", 5, -2e5)}),
     Scene("faults", QUICK, near=(0.05, 0.5), speed=0.2, cycles=160, resume=(60, 90, 91, 120, 150),
           late={45: 0.07, 135: 0.3},
-          change={50: spoilt("qd", 2, np.inf), 51: spoilt("q_commanded", 0, -1e3), 80: back(0.5), 100: aged(0.2),
-                  120: aged(-0.2), 140: spoilt("qd_commanded", 6, np.nan), 141: no_time, 142: aged(np.nan)},
+          change={50: spoilt("qd", 2, np.inf), 51: spoilt("q_commanded", 0, -1e3), 100: aged(0.2),
+                  80: lambda inputs: replace(inputs, stamp=inputs.stamp - 0.5), 120: aged(-0.2), 142: aged(np.nan),
+                  140: spoilt("qd_commanded", 6, np.nan), 141: lambda inputs: replace(inputs, stamp=np.nan)},
           meets=("(RobotState.qd holds inf", "RobotState.q_commanded", "backwards", "0.201 s old",
                  "in the future", "RobotState.stamp holds", "Inputs.stamp is", "ago")),
     Scene("limits", QUICK, posture=NEAR_LIMITS, near=(0.05, 0.5), cycles=80, meets=("at the box",)),

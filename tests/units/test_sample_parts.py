@@ -169,10 +169,6 @@ def test_a_unit_with_zones_has_one_imu_in_its_own_axes(arm, panda_model, zoned, 
     assert sent == [(int(zoned.first[unit]), counts) for unit, counts in true]
 
 
-def feeling(skin: Skin, model, *units: int) -> Skin:
-    return Skin([replace(u, touch=TouchPatch()) if k in units else u for k, u in enumerate(skin.units)], model)
-
-
 def pressed(plant: Plant, skin: Skin, time: float) -> list[PointForce]:
     """The first unit is pressed on with 3 N from 1.5 s to 2.5 s."""
     link, T = int(skin.link[0]), skin.T_link_sensor[0]
@@ -181,7 +177,8 @@ def pressed(plant: Plant, skin: Skin, time: float) -> list[PointForce]:
 
 
 def test_a_touch_comes_over_the_wire_with_its_force_and_never_fresher_than_it_is(arm, panda_model, paper_skin):
-    skin = feeling(paper_skin, panda_model, 0, 2)
+    units = [replace(u, touch=TouchPatch()) if k in (0, 2) else u for k, u in enumerate(paper_skin.units)]
+    skin = Skin(units, panda_model)
     with WireSkin(arm, skin, RangeFinderParams(), FleetParams(), 0, laid=partial(pressed, arm, skin)) as wire:
         assert wire.touch() is None
         rows = []

@@ -48,7 +48,7 @@ class Desk:
         for _ in range(round(duration / 0.001)):
             self.now = round(self.now + 0.001, 6)
             if round(1000 * self.now) % (1000 * self.every) == 0:
-                self.unit.take_range(ranged(self.now))
+                self.unit.take_range(RangeSample(0, self.now, 0.5, RangeStatus.OK, 0.006, 0.3))
             self.said += [(self.now, datagram) for datagram in self.unit.tick(self.now)]
         return self.said[begin:]
 
@@ -72,10 +72,6 @@ class Desk:
     def samples(self, said, session: Mac | None = None) -> list[Sample]:
         """Samples among what was said, of the newest session by default."""
         return [decode_sample(d, session or self.session()) for _, d in said if d[3] == Kind.SAMPLE]
-
-
-def ranged(time: float, distance: float = 0.5) -> RangeSample:
-    return RangeSample(0, time, distance, RangeStatus.OK, 0.006, 0.3)
 
 
 @pytest.fixture

@@ -36,10 +36,6 @@ class Wire:
         return self.sent[number], self.unit(made) - self.unit(self._down[number])
 
 
-def with_losses(values, losses):
-    return np.array([np.nan if lost else value for value, lost in zip(values, losses, strict=True)])
-
-
 @given(
     st.floats(-1000.0, 1000.0), st.floats(-0.99 * DRIFT, 0.99 * DRIFT),
     st.lists(st.tuples(delays, st.booleans()), min_size=1, max_size=60),
@@ -50,7 +46,7 @@ def test_the_truth_is_within_the_bounds_and_no_stamp_is_later_and_newer_readings
     offset, drift, down, up, window
 ):
     ages = [age for _, _, age in up]
-    down, up = (with_losses(*list(zip(*pairs, strict=True))[:2]) for pairs in (down, up))
+    down, up = (np.array([np.nan if lost else delay for delay, lost, *_ in pairs]) for pairs in (down, up))
     wire, clock = Wire(offset, 1.0 + drift, down, up), UnitClock(DRIFT, window)
     newest = -math.inf
     for made, arrival in wire.order:
