@@ -63,7 +63,7 @@ def written(folder: Path, text: str, name: str = "arm.urdf") -> Path:
 def equipped(folder: Path, units: int = 8) -> Path:
     """Put a skin of suggested units into the folder of an imported arm."""
     model = RobotModel(load_description(folder))
-    setting = CoverageSetting(model, floor_and_pedestal(-0.2), CoverageParams(), "joints", 4)
+    setting = CoverageSetting(model, floor_and_pedestal(-0.2), CoverageParams(), "paths", 12)
     chosen = suggest(setting.draw(), Skin([], model), units)
     save_skin(Skin([one.unit for one in chosen], model), folder / OWN_SKIN)
     return folder

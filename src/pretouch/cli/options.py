@@ -10,7 +10,7 @@ from tyro.constructors import PrimitiveConstructorSpec
 
 from pretouch.arms import DEFAULT, ArmOptions
 from pretouch.errors import HardwareError
-from pretouch.params import OFFERED
+from pretouch.params.pretouch import OFFERED
 from pretouch.units import HOST, PORT
 
 A = TypeVar("A", bound=ArmOptions)

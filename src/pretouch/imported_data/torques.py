@@ -7,11 +7,28 @@ import numpy as np
 import scipy  # its parts load when they are first used: a quarter of a second that a help does not wait
 
 from pretouch.errors import RecordingError
-from pretouch.imported_data.log import TORQUES, Choice, ImportedRecording, Log, Note, check_reach, gaps, listed, pieces
-from pretouch.importing.mounting import lean_of, weights_of
+from pretouch.imported_data.log import (
+    TORQUES,
+    Choice,
+    ImportedRecording,
+    Log,
+    Note,
+    check_reach,
+    gaps,
+    listed,
+    pieces,
+)
+from pretouch.importing.mounting import (
+    LEAN_DEG,
+    direction_text,
+    fitted_gravity,
+    fitted_load,
+    lean_of,
+    squares_left,
+    weights_of,
+)
 from pretouch.params import SequentialParams
 from pretouch.robot.description import STANDING
-from pretouch.robot.kinematics import G_M_S2
 from pretouch.robot.model import RobotModel
 from pretouch.sim.observer import observe, observer_init
 from pretouch.types import FloatArray
@@ -26,10 +43,6 @@ _FAR_BETTER = 0.25
 _LITTLE, _MOST = 0.1, 0.5
 """Parts of the squared torques up to which an explanation leaves little, and from which on most [1]: a Panda's model
 leaves 1 to 9 % beside a tool of 3 kg that it lacks."""
-_REVERSING_RAD_S = 0.1
-"""Speed over which friction changes its sign [rad/s]."""
-_LEAN_DEG = 7.0
-"""Smallest angle between two directions of gravity that are told apart [degrees]: that tool tilts an estimate by 6."""
 _LIGHT, _HEAVY = 0.5, 1.5
 """Sizes of an estimated acceleration by gravity between which it is one, as a part of the true one [1]."""
 _SAMPLES = 400
@@ -163,28 +176,6 @@ def _check_units(place: Path, tau: FloatArray, expected: FloatArray, model: Robo
         )
 
 
-def _left(rest: FloatArray, qd: FloatArray) -> FloatArray:
-    """Squares of torques (S, n) [Nm] less the friction that explains them best, summed by joint (n,).
-
-    Friction never drives: its coefficients are at least 0, so that it tells the sign of a joint without gravity too.
-    The worst tenth of the samples does not count: there somebody may touch the arm.
-    """
-    turning, rest = np.stack([np.tanh(qd / _REVERSING_RAD_S), qd], axis=2), rest.copy()
-    for j in range(rest.shape[1]):
-        rest[:, j] -= turning[:, j] @ scipy.optimize.nnls(turning[:, j], rest[:, j])[0]
-    best = np.argsort((rest**2).sum(axis=1))[: int(0.9 * len(rest))]
-    return np.asarray((rest[best] ** 2).sum(axis=0))
-
-
-def _fitted(hold: FloatArray, weights: FloatArray, qd: FloatArray) -> tuple[FloatArray, float, float]:
-    """Fit gravity to torques (S, n) [Nm] that hold an arm of weights (S, n, 3) [kg m].
-
-    Returns its acceleration (3,) [m/s^2], how many times the true one that is, and the squares that it leaves.
-    """
-    gravity = np.asarray(np.linalg.lstsq(weights.reshape(-1, 3), hold.ravel())[0], np.float64)
-    return gravity, float(np.linalg.norm(gravity)) / G_M_S2, float(_left(hold - weights @ gravity, qd).sum())
-
-
 def _check_signs(
     place: Path, qd: FloatArray, tau: FloatArray, expected: FloatArray, model: RobotModel, by_robot: bool
 ) -> list[Note]:
@@ -194,7 +185,7 @@ def _check_signs(
     joints, and for torques turned round that stay unexplained; notes for others that do, and for unsure joints.
     """
     qd, tau = _some(qd), _some(tau)
-    same, other = (_left(s * tau - expected, qd) for s in (1.0, -1.0))
+    same, other = (squares_left(s * tau - expected, qd) for s in (1.0, -1.0))
     whole = (tau**2).sum(axis=0)
     wrong = (other < _FAR_BETTER * same) & (other < _MOST * whole)
     right = (same < _FAR_BETTER * other) & (same < _MOST * whole)
@@ -214,23 +205,13 @@ def _check_signs(
     return [*unexplained, *([Note("unsure_signs", {"names": listed(unsure)})] if unsure else [])]
 
 
-def _direction(gravity: FloatArray) -> str:
-    """Return a direction (3,) as --gravity takes it; near an axis that axis, for walls and ceilings are square."""
-    down = gravity / np.linalg.norm(gravity)
-    axis = np.round(down)
-    if np.abs(axis).sum() == 1.0 and down @ axis > np.cos(np.deg2rad(_LEAN_DEG)):
-        down = axis
-    return ",".join(f"{x:.3g}" for x in down.round(3) + 0.0)
-
-
 def _mounted(
     place: Path, motion: tuple[FloatArray, ...], expected: FloatArray, model: RobotModel, kind: str, choice: Choice
 ) -> tuple[RobotModel, list[Note]]:
     """Return the arm with the direction of gravity that measured torques have, and a note where it is another one.
 
     `motion` has positions, velocities and torques (N, n), `expected` (S, n) is by the description. A load that it lacks
-    is a note too. Of explanations that leave little, and far less than the description, one must leave far less than
-    the others.
+    is a note too. Of explanations that leave far less than the description, one must leave far less than the others.
     RecordingError for others than gravity, for two that are alike, for a direction given otherwise, and if external.
     """
     q, speed, tau = map(_some, motion)
@@ -239,37 +220,37 @@ def _mounted(
     weight, external = weights @ model.gravity, "external " if kind == "tau_ext" else ""
     # an interface takes for external the torque of the gravity that it knows less that of the true one
     hold = weight - tau if external else tau - expected + weight
-    same, whole, free, heavy = (float(_left(x, speed).sum()) for x in (hold - weight, tau, hold, weight))
-    gravity, size, left = _fitted(hold, weights, speed)
-    down, lean = _direction(gravity), lean_of(model, gravity)
+    same, whole, free, heavy = (float(squares_left(x, speed).sum()) for x in (hold - weight, tau, hold, weight))
+    gravity, size, left = fitted_gravity(hold, weights, speed)
+    down, lean = direction_text(gravity), lean_of(model, gravity)
     if not external and free < _LITTLE * heavy and size < _LIGHT and left > _MOST * free:
         raise RecordingError(
             f"The torques in {place} have no gravity in them, so they are external or commanded ones (tau_J_d): name"
             " external torques tau_ext1_Nm and so on, or give those that were measured."
         )
-    load = -J @ model.gravity  # of 1 kg more at the end-effector
-    kg = max(0.0, float((load * (hold - weight)).sum() / max((load**2).sum(), 1e-12)))
-    carried = float(_left(hold - weight - kg * load, speed).sum())
+    kg, carried = fitted_load(hold - weight, -J @ model.gravity, speed)
     if not external and carried < min(_LITTLE * whole, _FAR_BETTER * same, left / _FAR_BETTER):
         return model, [Note("load", {"kg": choice.payload + kg, "share": carried / whole, "before": same / whole})]
-    rival = min(same, carried, left if lean < _LEAN_DEG and _LIGHT < size < _HEAVY else same)
+    rival = min(same, carried, left if lean < LEAN_DEG and _LIGHT < size < _HEAVY else same)
     explanations = list[tuple[float, str, str]]()
-    if lean > _LEAN_DEG and _LIGHT < size < _HEAVY:
+    if lean > LEAN_DEG and _LIGHT < size < _HEAVY:
         tell = "tell the robot, or name measured torques tau1_Nm and so on, with" if external else "give"
-        along = f"those of an arm whose gravity points along {down} in its base frame, not {_direction(model.gravity)}"
+        along = (
+            f"those of an arm whose gravity points along {down} in its base frame, not {direction_text(model.gravity)}"
+        )
         explanations.append((left, along, f"{tell} --gravity {down}"))
     if not external:
-        other, size, rest = _fitted(weight - tau - expected, weights, speed)
-        if rest < _FAR_BETTER * left and lean_of(model, other) < _LEAN_DEG:
+        other, size, rest = fitted_gravity(weight - tau - expected, weights, speed)
+        if rest < _FAR_BETTER * left and lean_of(model, other) < LEAN_DEG:
             return model, []  # of the other sign, and nothing else: `_check_signs` names it
-        turned = f"minus those of an arm whose gravity points along {_direction(other)}"
+        turned = f"minus those of an arm whose gravity points along {direction_text(other)}"
         rest = rest if _LIGHT < size < _HEAVY else np.inf
-        explanations.append((rest, turned, f"give the other --sign and --gravity {_direction(other)}"))
+        explanations.append((rest, turned, f"give the other --sign and --gravity {direction_text(other)}"))
         scale = (tau * expected).sum(axis=0) / np.maximum((expected**2).sum(axis=0), 1e-12)
         # where gravity does little, friction hides the scale, and none is needed
         scale *= scale**2 * (expected**2).sum(axis=0) > _LITTLE * (tau**2).sum(axis=0)
         times = f"the model's times {', '.join(f'{x:.2g}' for x in scale)}, joint by joint, as motor currents are"
-        rest = float(_left(tau - scale * expected, speed).sum()) if (scale >= 0.0).all() else np.inf
+        rest = float(squares_left(tau - scale * expected, speed).sum()) if (scale >= 0.0).all() else np.inf
         explanations.append((rest, times, "name the columns current1_A and so on, and give --gains"))
     good = sorted(e for e in explanations if e[0] < min(_LITTLE * whole, _FAR_BETTER * rival))
     good = good[: 1 if len(good) < 2 or good[0][0] < _FAR_BETTER * good[1][0] else 2]

@@ -15,7 +15,8 @@ from pretouch.errors import RecordingError
 from pretouch.page.panel import SETTLE_S, ActionQueue, add_button, add_view_boxes, put, when_changed
 from pretouch.page.room import ObjectName, PathName
 from pretouch.page.simulation import LiveSimulation
-from pretouch.params import OFFERED, TaskParams
+from pretouch.params import TaskParams
+from pretouch.params.pretouch import OFFERED
 from pretouch.profiles import Profile, profile, profile_names
 from pretouch.sim.tcp_push import AXES
 

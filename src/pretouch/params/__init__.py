@@ -339,11 +339,3 @@ class AdmittanceParams(Checked):
     """Detection of a pinch between links, or a link and a fixture; none: each contact is a push."""
     give_up: GiveUpParams | None = None
     """Giving up after repeated contacts at a location; none: the arm never gives up."""
-
-
-OFFERED = (
-    "pretouch: ours. paper: the equations and Table I. paper-off: the same without restrictions."
-    " blind: without proximity, eqs. 8-10 with F_obs = 0. slowing-only, thresholds-only: one use of proximity each."
-    " paper-0.5m: obstacles count within the 0.5 m of the paper's text (V-C), not Table I's 0.8 m."
-)
-"""What each profile is, for a person who chooses one."""

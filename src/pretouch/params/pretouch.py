@@ -203,3 +203,11 @@ class NullSpaceMotion(Checked):
     """Largest norm of these joint velocities [rad/s]."""
     rate_rad_s2: Positive = 1.0
     """Largest rate of their change [rad/s^2]."""
+
+
+OFFERED = (
+    "pretouch: ours. paper: the equations and Table I. paper-off: the same without restrictions."
+    " blind: without proximity, eqs. 8-10 with F_obs = 0. slowing-only, thresholds-only: one use of proximity each."
+    " paper-0.5m: obstacles count within the 0.5 m of the paper's text (V-C), not Table I's 0.8 m."
+)
+"""The meaning of each profile, for a person who chooses one."""

@@ -62,10 +62,9 @@ class RunSetup:
         here = self.model.kinematics(q).position[self.model.ee]
         if self.task.path == "circle":
             usual = cast(Circle, self.placement.path("circle", 1.0))
-            center = self.task.center or usual.center
-            y, z = here[1:] - center[1:]
+            x, y, z = self.task.center or usual.center
             radius = usual.radius if self.task.radius is None else self.task.radius
-            return Circle(center, radius, float(np.arctan2(z, y)))
+            return Circle((x, y, z), radius, float(np.arctan2(here[2] - z, here[1] - y)))
         if self.task.path == "line":
             ends = cast(WayPoints, self.placement.path("line", 1.0)).points
             return WayPoints(ends[np.argsort(np.linalg.norm(ends - here, axis=1), kind="stable")])
