@@ -10,13 +10,12 @@ from pretouch.extras import ROS2
 pytest_pycollect_makemodule = modules_with(ROS2)
 
 # beyond 101 its ports are those that the system gives to anybody
-_DOMAINS = range(20, 101)
 
 
 @pytest.fixture(scope="session")
 def domain():
     """A domain; a name in the kernel, gone with the process, says that it is taken."""
-    for number in _DOMAINS:
+    for number in range(20, 101):
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as taken:
             try:
                 taken.bind(f"\0pretouch-tests-dds-{number}")

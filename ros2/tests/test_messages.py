@@ -11,7 +11,6 @@ from pretouch.errors import RobotError
 from pretouch_ros2.messages import JOINT_STATE, RANGE, TRAJECTORY, TRANSFORMS, USED, WireMessages
 from pretouch_ros2.params import Distribution
 
-DISTRIBUTIONS = get_args(Distribution)
 FLOATS = (np.nan, np.inf, -np.inf, 0.0, -0.0, 5e-324, 1.5)
 SPANS = {"int8": 7, "uint8": 8, "byte": 7, "octet": 7, "char": 8, "int16": 15, "uint16": 16, "int32": 31, "uint32": 32}
 
@@ -58,7 +57,7 @@ class Drawn:
         return int(self.rng.integers(-(2**bits) if signed else 0, 2**bits))
 
 
-@pytest.mark.parametrize("distribution", DISTRIBUTIONS)
+@pytest.mark.parametrize("distribution", get_args(Distribution))
 @pytest.mark.parametrize("kind", USED)
 def test_both_encoders_make_the_same_bytes_and_one_decodes_what_the_other_makes(kind, distribution):
     messages = messages_of(distribution)

@@ -29,8 +29,6 @@ from pretouch_ros2.commander import TOPICS
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 BRINGUP = ROOT / "pretouch_bringup"
-OPTIONS = sorted((BRINGUP / "config").glob("fr3_*.yaml"))
-LAUNCHES = sorted((BRINGUP / "launch").glob("*.launch.py"))
 
 
 def yaml(path: Path) -> Any:
@@ -109,7 +107,7 @@ class Launch:
         return space
 
 
-@pytest.mark.parametrize("path", LAUNCHES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sorted((BRINGUP / "launch").glob("*.launch.py")), ids=lambda path: path.stem)
 def test_a_launch_file_describes_a_launch_whose_files_are_there(path, monkeypatch):
     launch = Launch(monkeypatch)
     launch.run(path)
@@ -125,7 +123,7 @@ def commanded(monkeypatch: pytest.MonkeyPatch, **arguments: str) -> list[str]:
     return list(process["cmd"])
 
 
-@pytest.mark.parametrize("path", OPTIONS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sorted((BRINGUP / "config").glob("fr3_*.yaml")), ids=lambda path: path.stem)
 def test_the_program_is_started_with_options_that_it_takes(path, monkeypatch):
     program, *words = commanded(monkeypatch, config=str(path))
     run: Any = cli._read(words, Console(stderr=True))

@@ -10,8 +10,6 @@ from tests.examples import examples
 
 from pretouch.control.path import PathPace, reduce_speed, speed_scale
 
-D_MAX = 0.8
-
 
 def pace_of(scale: float, cycles: int) -> PathPace:
     """What is remembered some cycles after the factor was `scale`."""
@@ -26,7 +24,7 @@ def faded(fresh: list[float]) -> list[float]:
 
 def scales(distances: list[float]) -> list[float]:
     """Factor on the speed for a sequence of nearest distances [m], infinite where none is seen."""
-    return faded([speed_scale(d, D_MAX) for d in distances])
+    return faded([speed_scale(d, 0.8) for d in distances])
 
 
 @pytest.mark.parametrize(

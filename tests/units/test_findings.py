@@ -12,7 +12,6 @@ from pretouch.units.health import HealthParams, unit_health
 from pretouch.units.wire import NO_FORCE, Flag, TouchPart
 from tests.units.traffic import BEFORE, NOW, counts, heard, traffic
 
-LIMITS = HealthParams()
 WELL = int(Flag.RANGE_NEW)
 LATE = int(Flag.RANGE_NEW | Flag.RANGE_LATE)
 SILENT = {"state": "silent", "last_arrival": NOW - 2.0}
@@ -20,7 +19,7 @@ SILENT = {"state": "silent", "last_arrival": NOW - 2.0}
 
 def found(samples, counted=None, machine_late=0.0, **known):
     unit = unit_health(samples, NOW, traffic(**(counted or {}), **known), BEFORE)
-    return findings([unit], LIMITS, machine_late)
+    return findings([unit], HealthParams(), machine_late)
 
 
 def without_clock(seconds=10.0):
