@@ -131,7 +131,7 @@ def test_the_program_is_started_with_options_that_it_takes(path, monkeypatch):
     assert isinstance(run, Run)
     check_options(run)
     options = run.connection
-    assert (run.robot.arm, options.arm.sign, run.yes) == ("fr3", "by-robot", False)
+    assert (run.robot.arm, options.arm.sign, run.process.yes) == ("fr3", "by-robot", False)
     assert (options.desired, options.arm.torques.rpartition("/")[2]) == (
         path.stem.removeprefix("fr3_").replace("joystick", "twist").replace("moveit_servo", "trajectory"),
         "external_joint_torques",
