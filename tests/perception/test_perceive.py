@@ -24,7 +24,7 @@ def watcher(panda_model, paper_skin):
 def test_a_reading_becomes_an_obstacle_beside_the_hand(watcher):
     found = watcher.see(1.0, hand_left=0.3)
     np.testing.assert_array_equal(found.unit, [watcher.skin.ids.index("hand_left")])
-    np.testing.assert_allclose(found.point, [np.add(HAND_LEFT, [0.0, 0.3, 0.0])], atol=1e-4)
+    np.testing.assert_allclose(found.point, [np.add(HAND_LEFT, (0.0, 0.3, 0.0))], atol=1e-4)
     np.testing.assert_allclose(found.ee_distance, [np.hypot(0.408, 0.0584)], atol=1e-4)
     assert watcher.model.links[found.link[0]] == "panda_hand"
     np.testing.assert_allclose(found.direction, [[0, 1, 0]], atol=0.1)

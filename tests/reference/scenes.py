@@ -190,7 +190,7 @@ FAST = changed(task={"control_period_s": 0.001})
 AT_ONCE = changed(window={"samples": 2})
 HARD_AT_ONCE = changed(AT_ONCE, approach={"rows": "hard"})
 GENTLE = changed(AT_ONCE, detect={"compare": "raw"}, react={"compliance_m_s_n": 0.002})
-YIELDS = ("track", "react", "hold", "solved", "skipped", "filling", "A contact of")
+YIELDS = ("track", "react", "hold", "solved", "skipped", "Measuring the arm", "A contact of")
 
 SCENES = (
     Scene("paper", PROFILES["paper"], cycles=150, pushes={(110, 120): (0.0, -50.0, 0.0)}, near=(0.15, 1.2),
