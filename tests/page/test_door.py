@@ -113,7 +113,7 @@ def test_what_a_page_says_is_done(page, visitor):
     visitor.say(DRAG)
     until(lambda: len(page.actions) == 3)
     turns(page, 1)
-    assert page.controls.running.paused
+    assert page.controls.paused
     assert page._simulation.settings.profile.name == "blind"
     assert not np.allclose(page._simulation.hand_target, before, atol=0.05)
     visitor.type_text(control(page, "Profile text"), " paper:detect.f_base_n=8 ")

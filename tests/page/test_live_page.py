@@ -55,19 +55,14 @@ def clock(page):
     return Clock(page)
 
 
-def test_a_second_of_ticks_is_a_second_of_the_simulation_but_in_slow_motion_and_while_paused(clock, simulation):
+def test_a_second_of_ticks_is_a_second_of_the_simulation_but_while_paused(clock, simulation):
     before = simulation.time
     clock.turn(1.0)
     assert simulation.time - before == pytest.approx(1.0, abs=0.011)
     before = simulation.time
-    clock.page.controls.running.speed = 0.1
-    clock.turn(2.0)
-    assert simulation.time - before == pytest.approx(0.2, abs=0.011)
-    assert clock.page.pace.factor == pytest.approx(0.1, abs=0.02)
-    clock.page.controls.running.paused = True
-    before = simulation.time
+    clock.page.controls.paused = True
     clock.turn(1.0)
-    assert (simulation.time, clock.page.pace.factor) == (before, 0.0)
+    assert simulation.time == before
 
 
 def test_nobody_watching_costs_nothing_but_the_simulation(clock, monkeypatch):
@@ -126,22 +121,13 @@ def test_a_changed_profile_is_named_so_that_it_can_be_found_again():
 
 def test_all_controls_show_what_holds(clock, simulation):
     assert control(clock.page, "Profile text").value == "paper"
-    clock.page.controls.running.speed = 0.5
     clock.page.actions.put(lambda: simulation.set_profile(profile("pretouch:task.speed_m_s=0.2")))
     clock.page.actions.put(lambda: simulation.set_path("line"))
     clock.page.actions.put(lambda: simulation.reset(object="board -y", silenced=frozenset({"hand_left"})))
     clock.turn(0.1)
     profiles = {"Profile": "pretouch", "Path speed [m/s]": 0.2, "Profile text": "pretouch:task.speed_m_s=0.2"}
-    values = {"Clock speed": 0.5, "Path": "line", "Object": "board -y", "hand_left": False, **profiles}
+    values = {"Path": "line", "Object": "board -y", "hand_left": False, **profiles}
     assert {label: control(clock.page, label).value for label in values} == values
-
-
-@pytest.mark.parametrize("speed", [0.0, 7.0])
-def test_a_clock_speed_out_of_range_is_the_nearest_in_it(clock, speed):
-    give(clock.page, "Clock speed", speed)
-    clock.turn(SETTLE_S + 0.1)
-    assert clock.page.controls.running.speed == np.clip(speed, 0.1, 1.0)
-    assert control(clock.page, "Clock speed").value == np.clip(speed, 0.1, 1.0)
 
 
 def test_what_was_said_of_the_simulation_before_is_on_the_page_at_first(server, simulation):
@@ -251,6 +237,25 @@ def test_three_arms_with_one_hand_go_through_the_same_cycles(server, monkeypatch
     clock.turn(0.1)
     assert clock.page._companions is None
     assert not any("blind" in name for name in server.scene._handle_from_node_name)
+
+
+def test_the_opening_of_three_arms_repeats_until_somebody_acts(server, simulation, monkeypatch):
+    monkeypatch.setattr(LivePage, "_draw", lambda self, now: None)
+    monkeypatch.setattr(server, "get_clients", lambda: {0: SimpleNamespace(camera=SimpleNamespace())})
+    simulation.play_opening()
+    clock = Clock(LivePage(server, simulation))
+    assert control(clock.page, "Arms").value == "three arms"
+    assert any(name.endswith("invitation") for name in server.scene._handle_from_node_name)
+    clock.turn(0.2)
+    assert simulation.time > 0.15
+    simulation.opening = None  # as when the hand is back
+    clock.turn(0.1)
+    assert simulation.opening is not None
+    assert simulation.time < 0.15
+    click(clock.page, "Pause")
+    clock.turn(0.1)
+    assert simulation.opening is None
+    assert not any(name.endswith("invitation") for name in server.scene._handle_from_node_name)
 
 
 def test_the_tutorial_names_the_controls_there_are_and_no_others():

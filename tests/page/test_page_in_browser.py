@@ -157,7 +157,7 @@ def test_a_person_drives_the_arm_at_another_by_target(tmp_path, pages):
     while simulation.frame.step.mode is not Mode.TRACK:
         simulation.advance(0.1)
     with live(simulation) as served, chromium() as visitor:
-        pages[0].controls.running.paused = True  # however long the browser takes, the arm is driven from one place
+        pages[0].controls.paused = True  # however long the browser takes, the arm is driven from one place
         visitor.open(served)
         visitor.choose("Task", "drive yourself")
         visitor.press("Pause")

@@ -1,7 +1,7 @@
 """Controls of a live page. Each puts an action into the queue; the loop carries it out."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -29,17 +29,6 @@ _TEXT_HINT = "As on the command line, with any parameter: paper:detect.f_base_n=
 _NO_RESUME = "Resume: nothing waits for it"
 _RECORD_SETTLE_S = 0.3
 """Time without another click from which on one on Record counts [s]: each begins a file."""
-_CLOCK = 0.1, 1.0
-"""Range of the clock's speed, simulated over real time."""
-
-
-@dataclass
-class ClockState:
-    """Speed of time, and whether it is paused."""
-
-    paused: bool = False
-    speed: float = 1.0
-    """Simulated over real time."""
 
 
 def with_name(variant: Profile, base: str) -> Profile:
@@ -56,7 +45,8 @@ class Controls:
 
     def __init__(self, gui: GuiApi, simulation: LiveSimulation, actions: ActionQueue) -> None:
         self._gui, self._simulation, self._actions = gui, simulation, actions
-        self.running = ClockState()
+        self.paused = False
+        """True while no time passes."""
         self._settings: list[tuple[Any, str, Callable[[], object]]] = []
         """Controls that show a setting, the kind of their action, and what they are to show."""
         self._text: Any = None
@@ -108,8 +98,6 @@ class Controls:
         self._setting(path, simulation.set_path, "path", lambda: simulation.settings.path)
         thing = gui.add_dropdown("Object", get_args(ObjectName), hint="Restarts at time 0.")
         self._setting(thing, lambda name: simulation.reset(object=name), "object", lambda: simulation.settings.object)
-        clock = gui.add_slider("Clock speed", *_CLOCK, 0.1, 1.0, hint="Simulated over real time.")
-        self._setting(clock, self._set_clock, "clock speed", lambda: self.running.speed, SETTLE_S)
         if not simulation.real:
             with gui.add_folder("Sensor units"):
                 self._unit_boxes()
@@ -170,14 +158,11 @@ class Controls:
         self._simulation.push(float(self._force.value) * axis, float(self._lasting.value))
 
     def _toggle_pause(self) -> None:
-        self.running.paused = not self.running.paused
+        self.paused = not self.paused
 
     def hold(self) -> None:
         """Let no time pass until somebody goes on."""
-        self.running.paused, self._pause.label = True, "Go on"
-
-    def _set_clock(self, speed: float) -> None:
-        self.running.speed = float(np.clip(speed, *_CLOCK))
+        self.paused, self._pause.label = True, "Go on"
 
     def _silence(self, _: object) -> None:
         self._simulation.silence(frozenset(unit for unit, box in self._units.items() if not box.value))
@@ -195,7 +180,7 @@ class Controls:
         if self._text is not None and changed and not self._actions.is_waiting("profile text"):
             self._written = self._profile.name
             put(self._text, self._written)
-        self._pause.label = "Go on" if self.running.paused else "Pause"
+        self._pause.label = "Go on" if self.paused else "Pause"
         self._record.label = "Stop recording" if self._simulation.recording else "Record"
 
     def offer_resume(self, possible: bool) -> None:

@@ -9,6 +9,7 @@ import socket
 import threading
 from collections.abc import Callable
 from functools import partial
+from html import escape
 from http import HTTPStatus
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 _ADDRESS = "Open the page at the address that the program printed: each start has its own."
 _STARTING = threading.Lock()
+_TITLE = b"<title>Viser<"
 
 
 class GuardedServer(ViserServer):
@@ -37,6 +39,7 @@ class GuardedServer(ViserServer):
         so the function that it calls is replaced meanwhile.
         """
         self._token, here = options.token.encode(), socket.gethostname().lower()
+        self._title = escape(title).encode()
         self._names = {options.host.lower(), "localhost", here, f"{here}.local"}
         serve, begun = websockets_server.serve, threading.Event()
 
@@ -66,8 +69,14 @@ class GuardedServer(ViserServer):
             refusal = refusal.encode(errors="backslashreplace").decode()
             return connection.respond(HTTPStatus.FORBIDDEN, refusal + "\n")
         request.path = "/" + request.path.partition("?")[0].lstrip("/").partition("/")[2]
+        if "Accept-Encoding" in request.headers:
+            del request.headers["Accept-Encoding"]  # compressed, the page's title could not be replaced
         response = answer(connection, request)
         if response is not None:
+            if _TITLE in (response.body or b""):
+                response.body = response.body.replace(_TITLE, b"<title>%b<" % self._title)
+                del response.headers["Content-Length"]
+                response.headers["Content-Length"] = str(len(response.body))
             response.headers["Referrer-Policy"] = "no-referrer"  # it would tell the token
         return response
 

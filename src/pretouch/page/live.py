@@ -37,7 +37,7 @@ class LivePage:
         """True if anybody has opened the page: an opening waits until then."""
         self._untouched = simulation.opening is not None
         """True until somebody drags or clicks: the opening, of three arms, repeats."""
-        self._companions = Companions(server, simulation) if self._untouched else None
+        self._companions: Companions | None = None
         """Arms beside the page's own; None: it is alone."""
         self._receiver_ended = False
         """True if the receiver of the real units has ended."""
@@ -52,6 +52,7 @@ class LivePage:
         self._scene = Scene(server, simulation.world, on_drag=self._drag)
         if self._untouched:
             self._scene.invite(_INVITATION)
+            self._companions = Companions(server, simulation)
         self.status.notice = f"{self._scene.notice} {simulation.notice}".strip()
         simulation.notice = ""
         self._history = History()
@@ -76,7 +77,7 @@ class LivePage:
 
     def turn(self, now: float) -> None:
         """Run queued actions, let time pass, and draw; `now` is the time of the machine [s]."""
-        simulation, running = self._simulation, self.controls.running
+        simulation = self._simulation
         self._run_actions(now)
         self._visited = self._visited or bool(self._server.get_clients())
         if simulation.opening and not self._visited:
@@ -86,16 +87,16 @@ class LivePage:
             self._begin_again()
         recording, before = simulation.recording, simulation.time
         self.drive.turn()
-        steps = [] if running.paused else simulation.advance(running.speed * PERIOD_S)
+        steps = [] if self.controls.paused else simulation.advance(PERIOD_S)
         for step in steps:
             self._history.add(step)
             self._scene.trail.add(step)
         if self._companions:
             self._companions.follow(len(steps))
-        if running.paused:
+        if self.controls.paused:
             self.pace = Pace()
         else:
-            self.pace.tick(now, max(0.0, simulation.time - before), running.speed)
+            self.pace.tick(now, max(0.0, simulation.time - before))
         if recording and recording.trouble:
             self._say(recording.trouble)
         if simulation.real and not self._receiver_ended and not simulation.real.source.alive:
@@ -148,7 +149,7 @@ class LivePage:
                 self._companions.draw(now)
             self._plots.draw(now)
             explanation = explain(step, world.units_in_use, world.model.links, motion.velocities if motion else None)
-            paused = "paused" if self.controls.running.paused else ""
+            paused = "paused" if self.controls.paused else ""
             recorded = f"recording {recording.place.name}" if recording else ""
             line = " · ".join(filter(None, (f"{step.stamp:.0f} s", paused, finds(step), recorded)))
             self.status.draw(step.mode, explanation, line, pace.sentence(), now)

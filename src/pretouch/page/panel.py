@@ -103,20 +103,18 @@ class Pace:
     def __init__(self) -> None:
         self.slow = False
         """True if the machine was too slow for two seconds, and has not kept up for one since."""
-        self.factor = 0.0
-        """Simulated over real time, of the last window."""
         self._shares = (1.0, 1.0)
+        """Simulated over real time, of the last two windows."""
         self._begin, self._simulated = -math.inf, 0.0
 
-    def tick(self, now: float, advanced: float, speed: float) -> None:
-        """Count an update at a time [s] before which the simulation advanced [s], as it should at a speed."""
+    def tick(self, now: float, advanced: float) -> None:
+        """Count an update at a time [s] before which the simulation advanced [s]."""
         if math.isinf(self._begin):
             self._begin = now
             return
         self._simulated, lasted = self._simulated + advanced, now - self._begin
         if lasted >= 1.0:
-            self.factor = self._simulated / lasted
-            self._shares = (self._shares[1], self.factor / speed)
+            self._shares = (self._shares[1], self._simulated / lasted)
             self.slow = max(self._shares) < (0.97 if self.slow else 0.9)
             self._begin, self._simulated = now, 0.0
 
@@ -125,8 +123,8 @@ class Pace:
         if not self.slow:
             return ""
         return (
-            f"This machine is too slow for real time: the clock runs at {100 * self._shares[1]:.0f} % of the chosen"
-            " speed, with the same physics."
+            f"This machine is too slow for real time: the clock runs at {100 * self._shares[1]:.0f} % of it,"
+            " with the same physics."
         )
 
 

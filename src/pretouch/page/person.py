@@ -105,7 +105,7 @@ class PersonHand:
         if self._invitation:
             self._invitation.remove()
         name = f"{self._root}/hand/invitation"
-        self._invitation = self._scene.add_label(name, sentence, position=(0.0, 0.0, 0.1)) if sentence else None
+        self._invitation = self._scene.add_label(name, sentence, position=(0.0, 0.0, -0.1)) if sentence else None
 
     def draw(self, hand: FloatArray | None, target: FloatArray | None, units: FloatArray) -> None:
         """Show hand and target (3,) [m]; None and what is not finite are not shown.

@@ -12,7 +12,7 @@ from pretouch.explanation import SEEN_NOW_S, binding
 from pretouch.page import palette
 from pretouch.page.arm import SHADELESS, quaternions
 from pretouch.page.frame import Frame
-from pretouch.perception.obstacles import locate, placed_sensors
+from pretouch.perception.obstacles import placed_sensors
 from pretouch.robot.kinematics import Kinematics
 from pretouch.sensing.skin import Skin
 from pretouch.types import BoolArray, FloatArray, IntArray
@@ -82,15 +82,9 @@ class Units:
         return placed_sensors(self._skin.arrays, kin)[0][self._skin.first]
 
     def draw(self, frame: Frame, kin: Kinematics, silent: BoolArray, perceiving: bool) -> None:
-        """Show what the units see, and which of them (K,) are silent.
-
-        A controller that is not `perceiving` has no obstacles: then every reading is a sensed point.
-        """
+        """Show what the units see, and which of them (K,) are silent, and no cones unless it is `perceiving`."""
         reading, near = np.where(silent, np.nan, frame.step.range_distance), frame.step.obstacles
-        if not perceiving:
-            unit = np.flatnonzero(np.isfinite(reading))
-            points, age = locate(*placed_sensors(self._skin.arrays, kin)[:2], reading)[unit], np.zeros(len(unit))
-        elif frame.places is None:
+        if frame.places is None:
             points, age, unit = near.point, near.age, near.unit
         else:
             places, some = frame.places, slice(frame.places.number[0])
