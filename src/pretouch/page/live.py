@@ -18,7 +18,6 @@ from pretouch.page.simulation import LiveSimulation
 from pretouch.types import FloatArray
 
 _ARMS = ("one arm", "three arms")
-_INVITATION = "Drag the hand into the arm's way"
 
 
 class LivePage:
@@ -44,14 +43,13 @@ class LivePage:
         style_page(server)
         self.status = Status(server.gui)
         if not simulation.real:
-            hint = "Three: blind, paper and pretouch with one hand."
-            arms = server.gui.add_dropdown("Arms", _ARMS, initial_value=_ARMS[self._untouched], hint=hint)
+            arms = server.gui.add_dropdown("Arms", _ARMS, initial_value=_ARMS[self._untouched], hint="With one hand.")
             when_changed(arms, self.actions, self._show_arms, "arms")
         self.controls = Controls(server.gui, simulation, self.actions)
         self.drive = Drive(server, simulation, self.actions)
         self._scene = Scene(server, simulation.world, on_drag=self._drag)
         if self._untouched:
-            self._scene.invite(_INVITATION)
+            self._scene.invite("Drag the hand into the arm's way")
             self._companions = Companions(server, simulation)
         self.status.notice = f"{self._scene.notice} {simulation.notice}".strip()
         simulation.notice = ""

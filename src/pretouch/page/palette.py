@@ -38,6 +38,7 @@ EXPECTED: tuple[Colour, ...] = (ARM, (250, 208, 138), (242, 130, 58), (204, 28, 
 REMEMBERED: tuple[Colour, ...] = (SENSED, (203, 228, 213))
 """A place that is seen now, and one that nothing has seen for long."""
 
+_AXES: tuple[Colour, ...] = ((204, 0, 0), (0, 153, 0), (0, 0, 204))
 _LINES = {
     "path": PATH,
     "followed": FOLLOWING,
@@ -77,7 +78,8 @@ def legend() -> str:
     marks += _mark("cone of a unit that sees something", css(SEEING), 8, 8, 1)
     marks += _mark("distance to the nearest unit", css(FOLLOWING), 14, 1, 0)
     marks += _mark("closest pair", css(PAIR), 14, 2, 0) + _mark("silent unit", css(UNIT_SILENT), 8, 8, 1)
-    for name, colours in {"sensed, and remembered": REMEMBERED, "contact expected": EXPECTED}.items():
+    bands = {"seen, and remembered": REMEMBERED, "contact expected": EXPECTED, "axes x, y, z of the base": _AXES}
+    for name, colours in bands.items():
         marks += _mark(name, f"linear-gradient(90deg,{','.join(map(css, colours))})", 46, 8, 4)
     return f"<div style='padding:4px 12px 10px;font-size:11px;display:flex;flex-wrap:wrap;gap:3px 12px'>{marks}</div>"
 
