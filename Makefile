@@ -51,7 +51,7 @@ units: setup
 ros2: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ./ros2
 
-# the vendor's surfaces of the arm, for the page: 131 MB
+# what reads COLLADA meshes, and descriptions of arms with such meshes: 131 MB
 meshes: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[meshes]'
 

@@ -134,6 +134,7 @@ def test_an_arm_kept_off_its_path_says_by_what_and_how_far_and_never_that_it_fol
     assert said(step, path_position=off["path_position"], desired_velocity=back) == Explanation(
         Doing.RETURNING, "Returning to its path, 0.12 m away."
     )
+    assert said(step, path_position=off["path_position"], desired_velocity=np.zeros(3)).doing is Doing.MOVING
     # 12 mm behind, as an arm that lags, and corrected by 1.5 times that a second: it follows
     behind, correction = step.ee_position + np.array([0.0, 0.0, 0.012]), AHEAD + np.array([0.0, 0.0, 0.018])
     assert said(step, path_position=behind, desired_velocity=correction).doing is Doing.MOVING

@@ -9,13 +9,11 @@ from pretouch.extras import ROS2
 
 pytest_pycollect_makemodule = modules_with(ROS2)
 
-# beyond 101 its ports are those that the system gives to anybody
-
 
 @pytest.fixture(scope="session")
 def domain():
     """A domain; a name in the kernel, gone with the process, says that it is taken."""
-    for number in range(20, 101):
+    for number in range(20, 101):  # beyond, its ports are those that the system gives to anybody
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as taken:
             try:
                 taken.bind(f"\0pretouch-tests-dds-{number}")

@@ -209,9 +209,9 @@ def _on_the_way(step: "ControlStep", units: Sequence[str], links: Sequence[str])
     speed = float(np.linalg.norm(step.ee_velocity))
     restricted = limited.by is Limit.APPROACH
     if not (restricted or limited.by is Limit.SLOWED):
-        towards = float((step.path_position - step.ee_position) @ step.desired_velocity)
         # an arm that lags behind as it follows its path moves along it, not towards it
-        if off >= OFF_PATH_M and towards >= _TOWARDS * off * float(np.linalg.norm(step.desired_velocity)):
+        least = _TOWARDS * off * max(float(np.linalg.norm(step.desired_velocity)), ASKED_M_S)
+        if off >= OFF_PATH_M and (step.path_position - step.ee_position) @ step.desired_velocity >= least:
             return Explanation(Doing.RETURNING, f"Returning to its path, {off:.2f} m away.")
         near = step.obstacles.body_distance
         nothing = "nothing near is seen" if len(units) else "no sensor unit is in use"

@@ -42,6 +42,7 @@ def test_the_address_with_its_token_is_answered_and_tells_it_to_nobody_else(door
     status, text, kind = answered(door)
     assert (status, kind) == (200, "text/html")
     assert text.startswith("<!doctype html>")
+    assert "<title>test</title>" in text
     assert refusal(door) == (101, "")
     assert refusal(door, origin=f"http://127.0.0.1:{door.port}") == (101, "")
 

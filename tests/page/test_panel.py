@@ -177,6 +177,6 @@ def test_the_legend_names_every_colour_of_the_trail_and_the_marks_of_sensing():
     legend = palette.legend()
     for activity in Activity:
         assert palette.css(activity.value) in legend
-    for name, colour in (("sensed", palette.SENSED), ("closest pair", palette.PAIR), ("silent", palette.UNIT_SILENT)):
+    for name, colour in (("seen", palette.SENSED), ("closest pair", palette.PAIR), ("silent", palette.UNIT_SILENT)):
         assert name in legend
         assert palette.css(colour) in legend

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 import trimesh
-from tools.surfaces import coarse
 
 from pretouch.page.person import cuff, fist
 from pretouch.page.surfaces import EDGE_M, capsule_surfaces, surface_of, vendor_surfaces
@@ -36,25 +35,6 @@ def test_the_surface_of_every_link_lies_on_its_body_dense_enough_to_be_coloured(
         assert np.abs(apart).min(axis=1).max() < 1e-3
         assert mesh.volume > 0
         assert np.percentile(mesh.edges_unique_length, 90) < 1.5 * EDGE_M
-
-
-def sphere(rings: int = 60) -> trimesh.Trimesh:
-    """A sphere of radius 5 cm, each triangle with vertices of its own, as the vendor's files have them."""
-    ball = trimesh.creation.uv_sphere(0.05, count=(rings, rings))
-    corners = np.arange(3 * len(ball.faces)).reshape(-1, 3)
-    return trimesh.Trimesh(ball.triangles.reshape(-1, 3), corners, process=False)
-
-
-def test_a_coarse_mesh_has_few_vertices_near_the_fine_one_looks_outwards_and_has_no_empty_or_double_triangle():
-    fine = sphere()
-    mesh = coarse(fine, 0.006)
-    assert len(mesh.vertices) < len(fine.vertices) / 10
-    assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 0.05).max() < 0.003
-    assert np.einsum("vi,vi->v", mesh.vertex_normals, mesh.vertices).min() > 0
-    assert set(np.unique(mesh.faces)) == set(range(len(mesh.vertices)))
-    corners = np.sort(mesh.faces, axis=1)
-    assert (np.diff(corners, axis=1) > 0).all()
-    assert len(np.unique(corners, axis=0)) == len(corners)
 
 
 def test_an_arm_of_which_there_are_no_surfaces_is_drawn_by_its_capsules_and_a_sentence_says_why(fr3_model):

@@ -1,6 +1,9 @@
 """What is remembered of a robot from one run to the next: its free motion, and bounds by physics on it."""
 
 import os
+import signal
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -191,6 +194,23 @@ def test_writing_that_fails_is_a_sentence_and_leaves_the_old_file(file, arm, ano
     assert "The previous file is unchanged" in said
     assert file.path.read_bytes() == before
     assert [file.name for file in file.path.parent.iterdir()] == [file.path.name]
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+os.fsync = lambda _: os.kill(os.getpid(), signal.SIGKILL)
+from pretouch.atomic_write import atomic_write
+atomic_write(Path(sys.argv[1]), "half of it")
+"""
+
+
+def test_a_process_that_is_killed_while_it_writes_leaves_the_old_file(tmp_path):
+    path = tmp_path / "kept.toml"
+    path.write_text("precious")
+    done = subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False)
+    assert done.returncode == -signal.SIGKILL
+    assert path.read_text() == "precious"
 
 
 def test_robots_have_files_of_their_own(tmp_path):

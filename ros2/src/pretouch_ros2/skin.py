@@ -101,7 +101,7 @@ class Ros2Skin:
         stamp = self._stamps[unit].instant(message.header, received, writer)
         if stamp is not None:
             value, status = float(message.range), status_of(message)
-            if value != self._same[unit][0] or status is RangeStatus.SIGNAL:  # nothing near is the same for long
+            if value != self._same[unit][0] or status is RangeStatus.SIGNAL or math.isinf(value):
                 self._same[unit] = (value, stamp)
             self._newest[unit] = (stamp, value, status)
 

@@ -46,7 +46,7 @@ class Live:
     skin: OptionalFile = None
     """Skin file; by default sixteen units with zones, of an imported arm the skin in its folder."""
     opening: bool = True
-    """True if a hand comes by itself at first, until somebody drags or clicks; never with --keys or --record."""
+    """True if three arms and a scripted hand begin, until somebody drags or clicks; never with --keys or --record."""
     units: UnitOptions = field(default_factory=UnitOptions)
 
     def run(self) -> None:

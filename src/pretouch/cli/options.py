@@ -60,7 +60,7 @@ def _optional(info: tyro.constructors.PrimitiveTypeInfo) -> PrimitiveConstructor
     return PrimitiveConstructorSpec(
         nargs=1,
         metavar=kind.__name__.upper(),
-        instance_from_str=lambda words: kind(words[0]),
+        instance_from_str=lambda words: None if words[0] == "None" else kind(words[0]),
         is_instance=lambda value: value is None or isinstance(value, kind),
         str_from_instance=lambda value: [str(value)],
     )

@@ -141,7 +141,7 @@ def _link_table(setting: CoverageSetting, measures: list[measure.Coverage]) -> T
         f" {p.object_speed_m_s:g} m/s, and the arm moves towards it at {p.arm_speed_m_s:g} m/s: it must be seen"
         f" {p.warning_m:.2f} m before contact. Paths: share of the free paths to the surface that are seen in time."
         f" Met: share of what stands in the way of the moving arm that is seen, {p.standing().warning_m:.2f} m before"
-        " contact at the latest. Hand: share of what the hand meets along its own axes that is seen from there on.",
+        " contact at the latest. Hand: the same share for the hand alone, in all directions.",
         names=1,
     )
 

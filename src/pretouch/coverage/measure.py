@@ -85,8 +85,7 @@ class CoverageSetting:
         """Draw ways of what comes, of what the moving arm meets, and of what its hand meets; another `sample` differs.
 
         What is met is at rest. The hand moves either way on its path, or in any direction. The last are its ways
-        along three random axes at right angles, both ways. All six have the same weight, also the one that the fingers
-        point to, where there is little surface.
+        both ways along three random axes at right angles in each posture, with the same weight for each direction.
         """
         model, room, rng = self.model, self.room, np.random.default_rng([self.seed, 51, sample])
         q, along = postures(model, room, self.workspace, self.postures, rng)

@@ -211,7 +211,7 @@ def _mounted(
     """Return the arm with the direction of gravity that measured torques have, and a note where it is another one.
 
     `motion` has positions, velocities and torques (N, n), `expected` (S, n) is by the description. A load that it lacks
-    is a note too. Of explanations that leave far less than the description, one must leave far less than the others.
+    is a note, if it leaves less than another mounting. Of other explanations one must leave far less than the rest.
     RecordingError for others than gravity, for two that are alike, for a direction given otherwise, and if external.
     """
     q, speed, tau = map(_some, motion)
@@ -229,7 +229,7 @@ def _mounted(
             " external torques tau_ext1_Nm and so on, or give those that were measured."
         )
     kg, carried = fitted_load(hold - weight, -J @ model.gravity, speed)
-    if not external and carried < min(_LITTLE * whole, _FAR_BETTER * same, left / _FAR_BETTER):
+    if not external and carried < min(_LITTLE * whole, _FAR_BETTER * same, left):
         return model, [Note("load", {"kg": choice.payload + kg, "share": carried / whole, "before": same / whole})]
     rival = min(same, carried, left if lean < LEAN_DEG and _LIGHT < size < _HEAVY else same)
     explanations = list[tuple[float, str, str]]()

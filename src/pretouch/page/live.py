@@ -135,7 +135,7 @@ class LivePage:
             self._companions.begin()
         self._scene.trail.clear()
         self._history.clear()
-        self.drive.steering.goal = None
+        self.drive.steering.goal, self._time = None, self._simulation.time
 
     def _draw(self, now: float) -> None:
         frame, pace, recording = self._simulation.frame, self.pace, self._simulation.recording

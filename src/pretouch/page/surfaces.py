@@ -4,7 +4,6 @@ The vendor's come with the package, coarse enough for a page.
 """
 
 import math
-from collections.abc import Sequence
 from importlib.resources import files
 from typing import cast
 
@@ -34,11 +33,8 @@ def capsule_surfaces(model: RobotModel) -> dict[int, Trimesh]:
 def surface_of(capsules: Capsules, around: int = AROUND) -> Trimesh:
     """Join the surfaces of capsules, at least one. Parts inside other capsules stay: they are not seen."""
     parts = zip(capsules.a, capsules.b, capsules.radius, strict=True)
-    return _joined([_surface(a, b, float(radius), around) for a, b, radius in parts])
-
-
-def _joined(meshes: Sequence[Trimesh]) -> Trimesh:
-    return cast("Trimesh", trimesh.util.concatenate(meshes))
+    surfaces = [_surface(a, b, float(radius), around) for a, b, radius in parts]
+    return cast("Trimesh", trimesh.util.concatenate(surfaces))
 
 
 def _surface(a: FloatArray, b: FloatArray, radius: float, around: int) -> Trimesh:

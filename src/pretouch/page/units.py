@@ -94,7 +94,7 @@ class Units:
         cones = _coloured(marks, palette.CONE)
         # of zones, what any of them says
         plates = _coloured([np.logical_or.reduceat(mark, self._skin.first) for mark in marks], palette.UNIT)
-        # a cone ends at what it shows or before, the shorter the farther that is; the floor and the arm show nothing
+        # a cone ends at what it shows, and from 0.2 m on before it, the shorter the farther; floor and arm show nothing
         far = np.maximum(_IDLE_M, _NEAR_M - _SHORTER * reading)
         lengths = np.where(seeing, np.round(np.minimum(reading, far), 2), _IDLE_M).astype(np.float32)
         opacities = np.where(seeing, _CLEAR, _FAINT).astype(np.float32)

@@ -90,7 +90,7 @@ def run_setup(arm: ArmOptions, robot: RobotOptions, units: SkinOptions, task: Ta
     if not np.isfinite(floor):
         raise ParameterError(f"--floor is {floor}: give a height in metres.")
     if len(task.center) not in (0, 3) or not np.isfinite(task.center).all():
-        raise ParameterError(f"--center has {len(task.center)} numbers: give x,y,z in metres, as 0.5,0,0.4.")
+        raise ParameterError(f"--center is {','.join(map(str, task.center))}: give x,y,z in metres, as 0.5,0,0.4.")
     circle = task.path == "circle" and not (task.center and task.radius is not None)
     placement = placement_for(model) if circle or task.path == "line" else Placement()
     assumed = assumptions(model, placement)
