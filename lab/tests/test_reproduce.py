@@ -116,7 +116,7 @@ def test_a_schedulers_workers_play_a_trial_as_this_process_does(tmp_path, contex
     from distributed import LocalCluster
 
     out = tmp_path / "out"
-    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0") as cluster:
         words = ["reproduce", "between", "--profiles", "paper", "--seeds", "1", "--out", str(out)]
         assert cli.main([*words, "--scheduler", cluster.scheduler_address]) == 0
     (row,) = map(json.loads, (out / "rows.jsonl").read_text().splitlines())

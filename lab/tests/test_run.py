@@ -160,7 +160,7 @@ def test_a_schedulers_workers_play_and_one_that_does_not_answer_is_named(tmp_pat
     skip_without(CLUSTER)
     from distributed import LocalCluster
 
-    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0") as cluster:
         with workers(scheduler=cluster.scheduler_address) as (executor, at_once):
             assert at_once == 4
             rows = run(played, plays_of(CELLS, range(20)), tmp_path, executor, at_once)

@@ -67,7 +67,7 @@ def test_an_episode_is_cut_after_twelve_seconds():
     assert over == [(False, False)] * 239 + [(False, True)]
 
 
-def test_into_a_board_that_units_see_the_force_ends_the_episode_alone_and_stays_small_under_the_shield():
+def test_into_a_board_that_units_see_the_force_ends_the_episode_alone_and_the_shield_stops_before_it():
     # not every board is in view: that of `circle +y` is met out of it, with 114 to 130 N under the shield too
     peak, earned, ended = {}, {}, {}
     for run, (shield, bound) in {
@@ -84,11 +84,10 @@ def test_into_a_board_that_units_see_the_force_ends_the_episode_alone_and_stays_
             if ended[run]:
                 break
         peak[run] = info["peak_force_n"]
-        assert info["contacts"] > 0
-        assert ("contact" in limits, "approach" in limits) == (shield, shield)
+        assert (info["contacts"] > 0, "approach" in limits) == (not shield, shield)
     assert ended == {"alone": True, "shielded": False, "unbounded": False}
     assert earned["alone"] < -20.0
-    assert peak["alone"] > Reward().bound_n > 3 * peak["shielded"]
+    assert peak["alone"] > Reward().bound_n > peak["shielded"] == 0.0
 
 
 def test_an_action_has_the_stamp_of_the_step_it_was_observed_at_and_never_goes_stale(monkeypatch):
