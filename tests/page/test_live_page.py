@@ -249,8 +249,8 @@ def test_the_opening_of_three_arms_repeats_until_somebody_acts(server, simulatio
     clock.turn(0.2)
     simulation.opening = None  # as when the hand is back
     clock.turn(0.1)
-    assert simulation.opening is not None
     assert {arm.simulation.time for arm in clock.page._companions._arms} == {simulation.time}
+    assert simulation.opening is not None
     click(clock.page, "Pause")
     clock.turn(0.1)
     assert simulation.opening is None
