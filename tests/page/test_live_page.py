@@ -192,20 +192,6 @@ def test_resuming_is_offered_only_where_a_hold_waits_for_it(clock, monkeypatch):
     assert (button.label, button.disabled) == ("Resume", False)
 
 
-def test_an_opening_waits_for_somebody_and_ends_with_the_first_click(clock, simulation, monkeypatch):
-    simulation.play_opening()
-    begun = simulation.time
-    clock.turn(1.0)
-    assert simulation.time == begun
-    monkeypatch.setattr(clock.page._server, "get_clients", lambda: {0: None})
-    clock.turn(3.0)
-    assert simulation.time > begun + 2.9
-    assert simulation.opening
-    click(clock.page, "Pause")
-    clock.turn(0.1)
-    assert simulation.opening is None
-
-
 @pytest.mark.slow
 def test_three_arms_with_one_hand_go_through_the_same_cycles(server, monkeypatch):
     model = RobotModel(panda())
@@ -239,18 +225,30 @@ def test_three_arms_with_one_hand_go_through_the_same_cycles(server, monkeypatch
     assert not any("blind" in name for name in server.scene._handle_from_node_name)
 
 
-def test_the_opening_of_three_arms_repeats_until_somebody_acts(server, simulation, monkeypatch):
+def test_the_opening_of_three_arms_plays_while_somebody_looks_and_repeats_until_the_first_click(
+    server, simulation, monkeypatch
+):
     monkeypatch.setattr(LivePage, "_draw", lambda self, now: None)
-    monkeypatch.setattr(server, "get_clients", lambda: {0: SimpleNamespace(camera=SimpleNamespace())})
     simulation.play_opening()
-    clock = Clock(LivePage(server, simulation))
+    clock, begun = Clock(LivePage(server, simulation)), simulation.time
     assert control(clock.page, "Arms").value == "three arms"
     assert any(name.endswith("invitation") for name in server.scene._handle_from_node_name)
-    clock.turn(0.2)
+    clock.turn(1.0)
+    assert simulation.time == begun
+    visitors = {0: SimpleNamespace(camera=SimpleNamespace())}
+    monkeypatch.setattr(server, "get_clients", lambda: visitors)
+    clock.turn(3.0)
+    assert simulation.time > begun + 2.9
+    assert simulation.opening
     simulation.opening = None  # as when the hand is back
     clock.turn(0.1)
+    assert simulation.opening
     assert {arm.simulation.time for arm in clock.page._companions._arms} == {simulation.time}
-    assert simulation.opening is not None
+    visitors.clear()
+    before = simulation.time
+    assert before < begun + 0.2
+    clock.turn(0.1)
+    assert simulation.time == before
     click(clock.page, "Pause")
     clock.turn(0.1)
     assert simulation.opening is None

@@ -73,7 +73,7 @@ def test_nothing_is_loaded_from_elsewhere(site, pages):
 
 def test_every_picture_says_in_words_what_it_shows(pages):
     pictures = [picture for page in pages.values() for picture in page.pictures]
-    assert len(pictures) > 15
+    assert len(pictures) >= 20
     assert [src for src, alt in pictures if len(alt) < 10] == []
 
 

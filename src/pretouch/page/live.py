@@ -32,10 +32,8 @@ class LivePage:
         self._server, self._simulation, self._say = server, simulation, say
         self._world, self._time = simulation.world, simulation.time
         self.pace, self.actions = Pace(), ActionQueue()
-        self._visited = False
-        """True if anybody has opened the page: an opening waits until then."""
         self._untouched = simulation.opening is not None
-        """True until somebody drags or clicks: the opening, of three arms, repeats."""
+        """True until somebody drags or clicks: the opening, of three arms, repeats while somebody has the page open."""
         self._companions: Companions | None = None
         """Arms beside the page's own; None: it is alone."""
         self._receiver_ended = False
@@ -77,8 +75,7 @@ class LivePage:
         """Run queued actions, let time pass, and draw; `now` is the time of the machine [s]."""
         simulation = self._simulation
         self._run_actions(now)
-        self._visited = self._visited or bool(self._server.get_clients())
-        if simulation.opening and not self._visited:
+        if self._untouched and not self._server.get_clients():
             return
         if self._untouched and not simulation.opening:
             simulation.play_opening()
