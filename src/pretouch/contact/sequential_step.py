@@ -107,7 +107,7 @@ def assess_sample(
     jacobian_into(kin.anchor, kin.axis, arm.moved_by[arm.ee], kin.position[arm.ee], J_ee)
     tilt_into(mechanism.upright, J_ee, tilt)
     results.detectable_n[0] = detectable_force(
-        J_ee, numbers.period, means, level - link_prior(mechanism), p.contact_gain, p.tails
+        J_ee, numbers.period, means, level - link_prior(mechanism), p.contact_gain, p.tails, p.observer_gain_1_s
     )
     # no learning while an obstacle could cause the torques
     alone = touching < _UNLIKELY and (numbers.learns == 2 or (numbers.learns == 1 and now.watched))
