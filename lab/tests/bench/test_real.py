@@ -20,7 +20,7 @@ from pretouch_lab.bench.pushes import RealPushes, in_any_direction, pushed, star
 from pretouch_lab.bench.real import alarms, contacts, delays, halves, parted, tables, trial
 from pretouch_lab.bench.real_sets import SETS, RealRun, corrected, files_digest, sets_in, stream_of
 
-FRANKA, UR10E, GLOVE = SETS[0], SETS[3], SETS[4]
+FRANKA, LWR4, _, UR10E, GLOVE = SETS
 PUSH = (3.0, 0.5, "panda_link5", (0.0, 30.0, 0.0))
 
 
@@ -54,11 +54,14 @@ def test_a_file_of_arrays_is_read_run_by_run_without_what_the_logger_missed(tmp_
     given["tau"][30] = np.nan
     np.savez(tmp_path / "a.npz", **given)
     free, wrist = UR10E.read([tmp_path / "a.npz"])
-    assert (len(free.time), free.joints, free.touched) == (n - 11, (), False)
+    assert (len(free.time), free.joints, free.label.max()) == (n - 11, (), 0)
     assert np.isfinite(free.torque).all()
     np.testing.assert_array_equal(wrist.q, motions[1].q)
     np.testing.assert_array_equal(np.flatnonzero(wrist.label == -1), np.arange(60, 70))
-    assert (wrist.joints, wrist.touched) == ((4, 5, 6), True)
+    assert (wrist.joints, wrist.label.max()) == ((4, 5, 6), 1)
+    # the velocities at the end of a smoothed run are the filter's
+    whole, cut = UR10E.read([tmp_path / "a.npz"])[1], LWR4.read([tmp_path / "a.npz"])[1]
+    np.testing.assert_array_equal(cut.qd, whole.qd[whole.time < whole.time[-1] - 0.5])
     (tmp_path / "c.npz").write_bytes(b"no archive")
     with pytest.raises(ExperimentError, match=r"c\.npz is no file of NumPy arrays .*: get it again"):
         UR10E.read([tmp_path / "c.npz"])
@@ -91,7 +94,7 @@ def folder(tmp_path_factory, panda_model, motions):
 
 def test_a_table_of_the_glove_gives_measured_torques_its_label_and_its_folders_link(folder):
     first, *_, last = GLOVE.read(GLOVE.files(folder))
-    assert (first.joints, first.touched, last.touched) == ((5,), True, False)
+    assert (first.joints, first.label.max(), last.label.max()) == ((5,), 1, 0)
     np.testing.assert_allclose(first.time[first.label == 1][[0, -1]], [3.0, 3.495], atol=1e-9)
     # gravity is in the second joint of measured torques, and in no external one
     assert np.abs(first.torque[:, 1]).max() > 10.0

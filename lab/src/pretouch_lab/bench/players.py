@@ -20,7 +20,6 @@ from pretouch.values import value
 from pretouch_lab.bench.real_sets import TorqueStream
 
 PERIOD_S = TaskParams().control_period_s
-_SIGMAS = 5.0
 
 
 @value
@@ -70,7 +69,7 @@ def free_torques(stream: TorqueStream) -> FloatArray:
 
 def five_sigma(learn: TorqueStream) -> Player:
     """Bound each joint's external torque by five times its root mean square in the free motion to learn from."""
-    bounds = _SIGMAS * np.sqrt((free_torques(learn) ** 2).mean(axis=0))
+    bounds = 5.0 * np.sqrt((free_torques(learn) ** 2).mean(axis=0))
 
     def play(recording: TorqueRecording) -> Alarms:
         time, newest = sampled(recording)

@@ -56,13 +56,9 @@ def in_any_direction(start: FloatArray, size: FloatArray | float, seed: int) -> 
 
 
 def told_least(stream: TorqueStream, start: FloatArray, size: FloatArray, spread: FloatArray) -> RealPushes:
-    """Return pushes on the end-effector in the direction that the torques tell least of.
+    """Return pushes of `size` (P,) [N] on the end-effector, in the direction that the torques tell least of.
 
-    Args:
-        stream: the recording.
-        start: (P,) [s].
-        size: (P,) [N].
-        spread: (n, n) covariance of the torques in free motion [Nm^2].
+    They begin at `start` (P,) [s]; `spread` (n, n) is the covariance of the torques in free motion [Nm^2].
     """
     r, force = stream.recording, np.empty((len(start), 3))
     for k, at in enumerate(np.searchsorted(r.time, start)):

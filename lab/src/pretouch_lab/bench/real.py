@@ -73,9 +73,8 @@ def parted(runs: list[RealRun]) -> list[RealRun]:
     """Cut a single recording in the middle, so that there are two halves."""
     if len(runs) > 1:
         return runs
-    (r,), middle = runs, len(runs[0].time) // 2
-    parts = (slice(middle), slice(middle, None))
-    return [RealRun(r.time[part], r.q[part], r.qd[part], r.torque[part], r.label[part], r.joints) for part in parts]
+    middle = len(runs[0].time) // 2
+    return [runs[0].part(slice(middle)), runs[0].part(slice(middle, None))]
 
 
 def _half(

@@ -19,13 +19,15 @@ from pretouch.params import SequentialParams
 from pretouch.robot import description
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.types import FloatArray, IntArray
+from pretouch.types import BoolArray, FloatArray, IntArray
 from pretouch.values import value
 
 _APART_S = 1.0
 """Time between two runs of a stream [s]: longer than the observer's memory and the end of a contact."""
 _COULOMB_RAD_S = 0.05
 """Range of joint velocity in which Coulomb friction changes its sign [rad/s]."""
+_MADE_UP_S = 0.5
+"""End of a filtered run [s]: 0.4 s before it velocities are still wrong by 0.1 rad/s, at the end by 0.6 to 1.4."""
 _SHARED_NM = 1e-9
 """Least sum of squared torques of a load [Nm^2]."""
 
@@ -47,10 +49,10 @@ class RealRun:
     joints: tuple[int, ...] = ()
     """Numbers, from 1, of the last joint before the touched link, several if uncertain; () for an unnamed link."""
 
-    @property
-    def touched(self) -> bool:
-        """True for a run with a contact."""
-        return bool((self.label == 1).any())
+    def part(self, which: slice | BoolArray) -> "RealRun":
+        """Return some of the samples."""
+        arrays = (self.time, self.q, self.qd, self.torque, self.label)
+        return RealRun(*(array[which] for array in arrays), self.joints)
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,11 @@ def _of_arrays(files: list[Path]) -> list[RealRun]:
     return runs
 
 
+def _of_filtered(files: list[Path]) -> list[RealRun]:
+    """Read such arrays that a filter without delay has smoothed: at a run's end it makes up velocities and torques."""
+    return [run.part(run.time < run.time[-1] - _MADE_UP_S) for run in _of_arrays(files)]
+
+
 def _of_glove(files: list[Path]) -> list[RealRun]:
     """Read tables of contactInterpretation, one for each contact place and motion, in a folder for each link.
 
@@ -126,13 +133,13 @@ def _run(parts: list[FloatArray], label: FloatArray, joints: tuple[int, ...]) ->
     finite = np.isfinite(np.column_stack([time, q, qd, torque])).all(axis=1)
     latest = np.maximum.accumulate(np.where(finite, time, -np.inf))
     usable = finite & np.append(np.True_, time[1:] > latest[:-1])
-    return RealRun(time[usable], q[usable], qd[usable], torque[usable], label[usable].astype(np.int64), joints)
+    return RealRun(time, q, qd, torque, label.astype(np.int64), joints).part(usable)
 
 
 _GLOVE_SOURCE = "rezayati/contactInterpretation, the folders dataset/franka_main/labeled_data/link*"
 SETS = (
     RealSet("franka_fast", "panda", "franka_fast.npz", "alisrour97/Franka_experiments", _of_arrays),
-    RealSet("lwr4", "lwr4", "lwr4.npz", "kjyv/FloBaRoID", _of_arrays),
+    RealSet("lwr4", "lwr4", "lwr4.npz", "kjyv/FloBaRoID", _of_filtered),
     RealSet(
         "rokae_yl", "xmate", "rokae_yl.npz", "YanjunLIU-ac/Dynamic_Parameter_Identification_for_Rokae_xMate", _of_arrays
     ),

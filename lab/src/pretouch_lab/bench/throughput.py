@@ -4,8 +4,7 @@ The arm is simulated at 1 kHz, with units of 19 rays each at 50 Hz and a control
 on the paper's circle: with nothing near, and with a person who pushes three times, in the nominal world or in `hard`.
 The measure is the CPU time of the process, which other load hardly changes. A short first run compiles everything.
 
-    python -m pretouch_lab.bench.throughput
-    python -m pretouch_lab.bench.throughput 60    # simulated seconds, 30 by default
+    python -m pretouch_lab.bench.throughput [SECONDS]    # simulated, 30 by default
 """
 
 import sys
