@@ -51,4 +51,5 @@ def source_page(file: Path, root: Path) -> str:
         f"## {path.name}\n\n````{kinds.get(path.suffix, 'text')}\n{path.read_text(encoding='utf-8').rstrip()}\n````\n"
         for path in files
     ]
-    return "\n".join([f"# {file.relative_to(root)}\n", *sections])
+    # a search finds what is said of a file, not the file
+    return "\n".join([f"---\nsearch: {{exclude: true}}\n---\n# {file.relative_to(root)}\n", *sections])
