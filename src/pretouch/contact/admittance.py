@@ -221,7 +221,9 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         events = {} if sticks else contact_event(inputs.detection)
         # at most one of these, the first that applies; giving up is reported beside it
         if clamp.torque:
-            events[Event.CLAMPED if clamp.open else Event.OPENING] = _clamp_detail(clamp)
+            apart = f"{clamp.between}, pushed apart with {clamp.force:.0f} N"
+            against = f"{clamp.torque:.1f} Nm against the direction of yielding"
+            events[Event.CLAMPED if clamp.open else Event.OPENING] = apart if clamp.between else against
         elif doing == "react" and self._waits(state.place, near, inputs):
             until = ", once nothing is seen near it" if near and not is_given_up(place, self.give_up) else ""
             at_reach = state.moved > _FAR * self.reach_m
@@ -264,13 +266,6 @@ def _residual(inputs: ReactionInputs) -> FloatArray:
     """Return the external torques (n,) [Nm]; without an estimate those of free motion, which move nothing."""
     residual = inputs.detection.residual
     return residual if below(residual, np.inf) else inputs.mass.mean[1].copy()
-
-
-def _clamp_detail(clamp: ClampState) -> str:
-    """Return the detail of a clamp: the parts around it, or the torque that shows it."""
-    if clamp.between:
-        return f"{clamp.between}, pushed apart with {clamp.force:.0f} N"
-    return f"{clamp.torque:.1f} Nm against the direction of yielding"
 
 
 _FAR = 0.95

@@ -7,7 +7,7 @@ from collections import defaultdict
 from contextlib import suppress
 from functools import cached_property
 from io import BytesIO
-from itertools import islice, takewhile
+from itertools import islice
 from pathlib import Path
 from urllib.parse import unquote
 from xml.etree import ElementTree as ET
@@ -71,8 +71,8 @@ class MeshFiles:
             with suppress(OSError, ValueError):  # a name may be too long, or none
                 if place.is_file():
                     return place
-        like = {place: _alike(parts, other) for other, place in self._below.get(Path(name).stem.lower(), [])}
-        best = [place for place, alike in like.items() if alike >= count]
+        like = {place: other for other, place in self._below.get(Path(name).stem.lower(), [])}
+        best = [place for place, other in like.items() if other[-count:] == parts[-count:]]
         if len(best) == 1 or len({place.read_bytes() for place in best}) == 1:  # a workspace has copies
             remark = f"Meshes are not where the file says: those of the same names in {best[0].parent} are taken."
             self._remarks += [] if remark in self._remarks else [remark]
@@ -116,11 +116,6 @@ def _package_name(folder: Path, files: list[str]) -> str:
         with suppress(OSError, ET.ParseError):
             return (ET.parse(folder / "package.xml").findtext("name") or "").strip() or folder.name  # noqa: S314
     return folder.name
-
-
-def _alike(parts: list[str], others: list[str]) -> int:
-    """Return how many parts at the end of two paths are the same."""
-    return len(list(takewhile(lambda pair: pair[0] == pair[1], zip(reversed(parts), reversed(others), strict=False))))
 
 
 def read_mesh(path: Path, remarks: list[str]) -> Trimesh:

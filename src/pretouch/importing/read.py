@@ -57,7 +57,10 @@ def read_robot(file: Path, folders: tuple[Path, ...] = (), arguments: tuple[str,
         reason = " ".join(str(error).split()).rstrip(".")
         raise RobotModelError(f"The file {file} cannot be read: {reason}: correct it.") from error
     name = spec.modelname if root.tag == "mujoco" else root.get("name")
-    _note_left_out(model, beside.remarks)
+    if model.neq:
+        beside.remarks.append(f"{model.neq} couplings, of joints that mimic others or of bodies, are left out.")
+    if others := int((~np.isin(model.geom_type, SOLIDS) & (model.geom_bodyid > 0)).sum()):
+        beside.remarks.append(f"{others} shapes that are planes, height fields or the like are left out.")
     return RobotTree(name or file.stem, model, beside)
 
 
@@ -129,14 +132,6 @@ def _check_bodies(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
                 f"{body.name}: euler is {body.alt.euler.tolist()} {unit}: these seem to be {other}, which <compiler"
                 " angle=...> has to say."
             )
-
-
-def _note_left_out(model: mujoco.MjModel, remarks: list[str]) -> None:
-    """Say what an arm will be without."""
-    if model.neq:
-        remarks.append(f"{model.neq} couplings, of joints that mimic others or of bodies, are left out.")
-    if others := int((~np.isin(model.geom_type, SOLIDS) & (model.geom_bodyid > 0)).sum()):
-        remarks.append(f"{others} shapes that are planes, height fields or the like are left out.")
 
 
 def _urdf(root: ET.Element, beside: Beside, file: Path, folders: tuple[Path, ...]) -> mujoco.MjSpec:

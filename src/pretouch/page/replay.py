@@ -213,16 +213,12 @@ class ReplayPage:
         end = time.perf_counter() + (_SEARCH_PLAYING_S if self.player.playing else _SEARCH_S)
         while self.timeline.share < 1.0 and time.perf_counter() < end:
             self.timeline.search(_AT_ONCE)
-            if self.timeline.share == 1.0:
-                self._mark_events()
+            if self.timeline.share == 1.0:  # a tick for each event
+                times = {self.player.time_of(event.index) for event in self.timeline.events}
+                # viser takes marks at the slider's creation only, when the events are not found yet
+                setattr(self._slider, "_marks", tuple(GuiSliderMark(at, None) for at in sorted(times)))  # noqa: B010
         if self._server.get_clients():
             self.draw(now)
-
-    def _mark_events(self) -> None:
-        """Put a tick on the slider for each event."""
-        times = {self.player.time_of(event.index) for event in self.timeline.events}
-        # viser takes marks at the slider's creation only, when the events are not found yet
-        setattr(self._slider, "_marks", tuple(GuiSliderMark(time, None) for time in sorted(times)))  # noqa: B010
 
     def draw(self, now: float) -> Kept:
         """Draw the step at the player's time, and return it."""

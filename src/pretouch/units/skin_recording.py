@@ -18,7 +18,7 @@ from pretouch.recording.ros import IMU, JOINT_STATE, RANGE, UNIT_SAMPLE, check_v
 from pretouch.recording.viewer_topics import header, item, nanoseconds, range_item, topic_name
 from pretouch.sensing.unit import LARGEST_COUNT, counts_of
 from pretouch.traces import ImuTrace
-from pretouch.types import FloatArray, IntArray
+from pretouch.types import FloatArray
 from pretouch.units.unit import Received, imu_batch
 from pretouch.units.wire import SAMPLE_LEAST, TAG_SIZE, Flag, imu_values, sample_of
 
@@ -167,16 +167,15 @@ def unit_trace(samples: list[Received]) -> UnitTrace:
         with suppress(ValueError):  # full scales that the sensor does not have
             batches.append((one, *imu_values(one.sample.imu, one.sample.imu_scale)))
     used = [one for one, *_ in batches if one.sample.imu_count]
-    index, count, time, age = (_column(used, name) for name in ("imu_index", "imu_count", "time_us", "imu_age_us"))
+    index, count, time, age = (
+        np.array([getattr(one.sample, name) for one in used], np.uint64).astype(np.int64)
+        for name in ("imu_index", "imu_count", "time_us", "imu_age_us")
+    )
     stamp = instants(ImuCounters(index, count, time, age, _times(used, "offset"), _times(used, "bound")))
     scales = [counts_of(one.sample.imu_scale) for one in used]
     full = [LARGEST_COUNT * min(lsb) for lsb in zip(*scales, strict=True)] or [np.inf, np.inf]
     values = (np.concatenate([np.zeros((0, 3)), *(batch[k] for batch in batches)]) for k in (1, 2))
     return UnitTrace(samples, ImuTrace(stamp, *values), *full)
-
-
-def _column(samples: list[Received], name: str) -> IntArray:
-    return np.array([getattr(one.sample, name) for one in samples], dtype=np.uint64).astype(np.int64)
 
 
 def _times(samples: list[Received], name: str) -> FloatArray:
