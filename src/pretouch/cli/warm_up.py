@@ -2,6 +2,7 @@
 
 import gc
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from multiprocessing.context import SpawnProcess
@@ -16,6 +17,7 @@ from pretouch.contact.window import Window
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.line import line, move, see
+from pretouch.page.room import LiveSettings, Room, live_path
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import Profile, profile
 from pretouch.realtime import warm_up
@@ -53,13 +55,16 @@ def prepare(chosen: Profile) -> None:
     """
     output, since, others = Console(stderr=True, highlight=False), list[float](), list[SpawnProcess]()
 
+    def beside(target: Callable[[], None]) -> None:
+        if (os.cpu_count() or 1) > 1 and kept_in():
+            others.append(get_context("spawn").Process(target=target, daemon=True))  # ends with this one
+            with kept_from_children():
+                others[-1].start()
+
     def begin(sentence: str) -> None:
         output.print(sentence)
         since.append(output.get_time())
-        if (os.cpu_count() or 1) > 1 and kept_in():
-            others.append(get_context("spawn").Process(target=compile_stages, daemon=True))  # ends with this one
-            with kept_from_children():
-                others[0].start()
+        beside(compile_stages)
 
     FIRST_START.say = begin  # type: ignore[method-assign]
     gc.disable()  # the collector looks through all that a compiler makes, for an eighth of the time
@@ -68,7 +73,11 @@ def prepare(chosen: Profile) -> None:
         _detect(controller, robot)
         for other in others:  # its part is then taken from where it is kept
             other.join()
+        if others:
+            beside(compile_simulation)
         warm_up(controller, robot, points=True)
+        for other in others:
+            other.join()
     finally:
         gc.enable()
         del FIRST_START.say
@@ -93,6 +102,13 @@ def compile_stages() -> None:
     blocks = controller.fixed.blocks, controller.init(robot).memory.blocks, controller.blank.copy().blocks
     see(*blocks, controller.beside)
     move(*blocks)
+
+
+def compile_simulation() -> None:
+    """Compile what simulates an arm and its units, in a process of its own."""
+    gc.disable()
+    settings, model = LiveSettings(profile=profile("pretouch")), RobotModel(panda())
+    Room(settings, live_path(settings), model, paper_skin(model)).tick()
 
 
 def _at_rest(chosen: Profile) -> tuple[Controller, RobotState]:

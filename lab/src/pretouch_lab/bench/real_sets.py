@@ -51,8 +51,8 @@ class RealRun:
 
     def part(self, which: slice | BoolArray) -> "RealRun":
         """Return some of the samples."""
-        arrays = (self.time, self.q, self.qd, self.torque, self.label)
-        return RealRun(*(array[which] for array in arrays), self.joints)
+        time, label = self.time[which], self.label[which]
+        return RealRun(time, self.q[which], self.qd[which], self.torque[which], label, self.joints)
 
 
 @dataclass(frozen=True)
