@@ -139,7 +139,7 @@ def test_a_command_that_a_sentence_names_exists_with_its_options(span, capsys):
     for length in range(len(path), 0, -1):  # what follows a command may be a value, as an experiment's name
         try:
             with pytest.raises(SystemExit) as ended:
-                _read([*path[:length], "--help"], Console(stderr=True))
+                _read([*path[:length], "--help-all" if path[0] == "run" else "--help"], Console(stderr=True))
         except PluginError:
             continue
         if ended.value.code == 0:

@@ -51,7 +51,8 @@ def test_its_options_are_in_its_help_alone(capsys):
     for words in (["run", "mine", "--help"], ["run", "--help"]):
         with pytest.raises(SystemExit):
             cli.main(words)
-        assert ("Serial device of its driver." in capsys.readouterr().out) == ("mine" in words)
+        said = capsys.readouterr().out
+        assert ("Serial device of its driver." in said, "--priority" in said) == ("mine" in words, False)
 
 
 def test_a_commander_of_whom_nothing_is_said_before_the_arm_moves_is_refused():

@@ -177,8 +177,7 @@ def test_what_grows_slowly_where_no_unit_sees_it_is_felt_and_not_learnt_away(pan
 # the force that the test says it finds, held against pushes of that force
 
 
-GAIN, TAILS, NEEDED, FAST = 15.0, 30.0, 10.0, 1e6
-J = np.eye(6, 3)
+GAIN, TAILS, NEEDED, FAST, J = 15.0, 30.0, 10.0, 1e6, np.eye(6, 3)
 
 
 def test_by_hand_for_a_cartesian_arm():

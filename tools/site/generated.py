@@ -45,11 +45,11 @@ def api_page(title: str, packages: tuple[str, ...]) -> str:
 
 
 def _help(words: list[str]) -> str:
-    """Return the output of a command's `--help`, 80 columns wide."""
+    """Return the output of a command's help, 80 columns wide."""
     text = io.StringIO()
     with patch.dict("os.environ", {"COLUMNS": "80", "NO_COLOR": "1"}), redirect_stdout(text):
         try:
-            main([*words, "--help"])
+            main([*words, "--help-all" if words == ["run"] else "--help"])
         except SystemExit as ended:
             if ended.code:
                 raise

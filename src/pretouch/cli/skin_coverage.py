@@ -67,14 +67,6 @@ class MeasureCoverage:
                 raise
             source = None
         skin = load_skin(source, model) if source else Skin([], model)
-        self._check_outputs(source)
-        fixed = floor_and_pedestal(self.floor)
-        setting = CoverageSetting(model, fixed, self.approach, self.workspace, self.postures, self.seed)
-        with numbers_to(self.json) as write:
-            write({"asked": self} | _measured(self, setting, skin))
-
-    def _check_outputs(self, source: Path | None) -> None:
-        """Refuse, before anything is computed, what could not be done or would be lost."""
         if self.suggest < 0:
             raise SkinError(f"--suggest is {self.suggest}: give 1 or more, or leave it out.")
         if self.out and not self.suggest:
@@ -84,6 +76,10 @@ class MeasureCoverage:
         if self.seed < 0:
             raise ParameterError(f"The seed is {self.seed}: give 0 or more.")
         check_outputs([("skin file", self.out), ("file", self.json)], [source], self.replace)
+        fixed = floor_and_pedestal(self.floor)
+        setting = CoverageSetting(model, fixed, self.approach, self.workspace, self.postures, self.seed)
+        with numbers_to(self.json) as write:
+            write({"asked": self} | _measured(self, setting, skin))
 
 
 def _measured(command: MeasureCoverage, setting: CoverageSetting, skin: Skin) -> dict[str, Any]:

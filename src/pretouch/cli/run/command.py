@@ -27,16 +27,22 @@ from pretouch.signals import noted_in_motion
 
 
 @dataclass(frozen=True)
-class Run(Generic[A]):
+class UsualOptions(Generic[A]):
     """Move an arm: checks, a guided push that confirms the force sign, the controller in real time, and rest.
 
     `pretouch run` and `pretouch run simulated` rehearse. `pretouch run NAME` moves another arm, with options of its
     own: franka, ros2 of the distribution pretouch-ros2, or one that another distribution adds.
-    The exit code is 1 if the run ended early or its recording failed, 2 if it was refused before anything moved.
+    `--help-all` also lists the options of the arm's model, the units, files and the process.
     """
 
     task: TaskOptions
     connection: A
+
+
+@dataclass(frozen=True)
+class Run(UsualOptions[A]):
+    """Move an arm; the exit code is 1 if the run ended early or its recording failed, 2 if it was refused before."""
+
     robot: RobotOptions
     units: SkinOptions
     process: ProcessOptions
@@ -45,7 +51,9 @@ class Run(Generic[A]):
     def of_words(words: Sequence[str]) -> tuple[Any, Sequence[str], str]:
         """Return the command for the arm that the first word names, the other words, and what is in front of them."""
         name, others = split_arm(words)
-        return Run[arm_class(name)], others, f"run {name}" if len(others) < len(words) else "run"  # type: ignore[misc]
+        kind: Any = Run if {"-h", "--help"}.isdisjoint(others) else UsualOptions
+        others = ["--help" if word == "--help-all" else word for word in others]
+        return kind[arm_class(name)], others, f"run {name}" if len(others) < len(words) else "run"
 
     def run(self) -> int | None:
         """Move the arm. Where a signal ended the run in order, its code is the exit code."""
