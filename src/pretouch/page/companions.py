@@ -14,7 +14,7 @@ SIDE_BY_SIDE = ("blind", "paper", "pretouch")
 """Profiles that are compared, those of them that the page's own arm does not have."""
 APART_M = 1.05
 """Distance between two arms [m], along y."""
-_LOOK_FROM, _LOOK_AT = (4.7, 0.45, 1.5), (0.2, 0.0, 0.3)
+_LOOK_FROM, _LOOK_AT = (5.0, 0.6, 1.6), (0.2, 0.15, 0.3)
 """Where the page looks from to see three arms, and at what [m]."""
 _LABEL_AT = (0.0, 0.0, 0.95)
 
