@@ -111,7 +111,7 @@ class InWorlds(Published):
 class DetectionOptions(InWorlds):
     """Compare contact detectors by delay, false alarms and missed contacts.
 
-    About half an hour on two processors, with --quick two minutes. The same --out continues a run that was stopped.
+    About forty minutes on two processors, with --quick two. The same --out continues a run that was stopped.
     """
 
 

@@ -306,13 +306,13 @@ def test_arms_that_nobody_is_near_move_alike_without_units(monkeypatch):
 
 
 def test_a_goal_is_reached_or_not():
-    row = {"false_alarms_per_hour": 1.0, "contacts": 9, "missed": 0, "median_delay_s": 0.03, "towards": 0}
+    row = {"false_alarms_per_hour": 1.0, "contacts": 9, "missed": 0, "median_delay_s": 0.025, "towards": 0}
     for change, expected in (
         ({}, "rate\nseen\nunseen\ndirection"),
         ({"false_alarms_per_hour": 1.01}, "seen\nunseen\ndirection"),
         ({"missed": 1}, "rate\ndirection"),
-        ({"median_delay_s": 0.031}, "rate\nunseen\ndirection"),
-        ({"towards": 1, "median_delay_s": 0.061, "false_alarms_per_hour": 2.0}, "none"),
+        ({"median_delay_s": 0.026}, "rate\nunseen\ndirection"),
+        ({"towards": 1, "median_delay_s": 0.033, "false_alarms_per_hour": 2.0}, "none"),
     ):
         own = row | change
         assert reached(own, own, own) == expected
