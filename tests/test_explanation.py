@@ -69,8 +69,8 @@ def test_an_arm_that_nothing_limits_says_its_speed_or_place_and_what_it_sees(ste
 
 def test_an_arm_too_loud_for_a_light_push_says_what_it_finds(step: ControlStep) -> None:
     assert finds(step) == ""
-    assert finds(replace(step, detectable_n=14.9)) == "detects pushes from 15 N on"
-    assert finds(replace(step, detectable_n=28.4)) == "at this speed, detects pushes from 28 N on only"
+    assert finds(replace(step, detectable_n=14.9)) == "detects pushes of 15 N or more"
+    assert finds(replace(step, detectable_n=28.4)) == "at this speed, detects only pushes of 28 N or more"
     assert finds(replace(step, detectable_n=np.inf)) == "at this speed, detects no push"
 
 

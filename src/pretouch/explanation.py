@@ -170,8 +170,8 @@ def finds(step: "ControlStep") -> str:
     if np.isnan(step.detectable_n):
         return ""
     if step.detectable_n <= LOUD_N:
-        return f"detects pushes from {step.detectable_n:.0f} N on"
-    loud = "no push" if np.isinf(step.detectable_n) else f"pushes from {step.detectable_n:.0f} N on only"
+        return f"detects pushes of {step.detectable_n:.0f} N or more"
+    loud = "no push" if np.isinf(step.detectable_n) else f"only pushes of {step.detectable_n:.0f} N or more"
     return f"at this speed, detects {loud}"
 
 
