@@ -70,8 +70,8 @@ def test_an_arm_that_nothing_limits_says_its_speed_or_place_and_what_it_sees(ste
 def test_an_arm_too_loud_for_a_light_push_says_what_it_finds(step: ControlStep) -> None:
     assert finds(step) == ""
     assert finds(replace(step, detectable_n=14.9)) == "detects pushes of 15 N or more"
-    assert finds(replace(step, detectable_n=28.4)) == "at this speed, detects only pushes of 28 N or more"
-    assert finds(replace(step, detectable_n=np.inf)) == "at this speed, detects no push"
+    assert finds(replace(step, detectable_n=28.4)) == "now detects only pushes of 28 N or more"
+    assert finds(replace(step, detectable_n=np.inf)) == "now detects no push"
 
 
 def test_eq_3_is_said_with_its_factor_and_the_unit_nearest_to_the_end_effector(step: ControlStep) -> None:

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from pretouch import realtime
+from pretouch.cli.warm_up import compile_stages
+from pretouch.compiled import FIRST_START
 from pretouch.controller import Controller
 from pretouch.profiles import at_rate, profile
 from pretouch.robot.model import RobotModel
@@ -48,6 +50,13 @@ def test_a_warm_up_sees_every_mode(panda_model, paper_skin, robot: RobotState, m
         assert seen >= {(Mode.TRACK, True), (Mode.TRACK, False), (Mode.REACT, True), (Mode.REACT, False)}
 
 
+def test_the_process_beside_does_not_say_again_that_it_compiles(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(FIRST_START, "logged", False)
+    monkeypatch.setattr(gc, "disable", lambda: None)
+    compile_stages()
+    assert FIRST_START.logged
+
+
 def test_steps_leave_nothing_for_the_collector(panda_model: RobotModel, paper_skin: Skin, robot: RobotState):
     controller = controller_of(panda_model, paper_skin, at_rate(profile("paper"), 1000.0))
     realtime.warm_up(controller, robot)
@@ -58,19 +67,17 @@ def test_steps_leave_nothing_for_the_collector(panda_model: RobotModel, paper_sk
 
 
 PROBE = """
-import sys, types
+import sys
 import numpy as np
 from pretouch import realtime
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
-from pretouch.loop import Cycle
 from pretouch.profiles import at_rate, profile
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.types import Inputs, Mode, RangeReadings, RobotState
-
 def loaded():
     found = {}
     for module in [m for name, m in sys.modules.items() if name.startswith("pretouch")]:
@@ -82,10 +89,8 @@ def loaded():
 model = RobotModel(panda())
 controller = Controller(model, paper_skin(model), no_fixtures(), Circle(), at_rate(profile("paper"), 1000.0))
 q, qd, now, units = model.description.q_ready, np.zeros(7), 0.0, len(controller.skin)
-
 def robot(push=0.0):
     return RobotState(now, q, qd, q, qd, np.zeros(7), np.array([push, 0, 0, 0, 0, 0]))
-
 if sys.argv[1] == "warm":
     realtime.warm_up(controller, robot())
 before, state, modes = loaded(), controller.init(robot()), set()
@@ -104,7 +109,6 @@ sys.exit(f"compiled in the loop: {new}" if new else 0)
 
 @pytest.mark.parametrize("how", ["warm", "cold"])
 def test_nothing_is_compiled_after_a_warm_up(how: str):
-    # one profile for all: which parts it has are numbers to what is compiled
     done = subprocess.run([sys.executable, "-c", PROBE, how], capture_output=True, text=True)
     assert done.returncode == (0 if how == "warm" else 1), done.stderr
     if how == "cold":

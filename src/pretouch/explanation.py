@@ -172,7 +172,7 @@ def finds(step: "ControlStep") -> str:
     if step.detectable_n <= LOUD_N:
         return f"detects pushes of {step.detectable_n:.0f} N or more"
     loud = "no push" if np.isinf(step.detectable_n) else f"only pushes of {step.detectable_n:.0f} N or more"
-    return f"at this speed, detects {loud}"
+    return f"now detects {loud}"
 
 
 def resumable(step: "ControlStep") -> bool:

@@ -174,9 +174,6 @@ def test_what_grows_slowly_where_no_unit_sees_it_is_felt_and_not_learnt_away(pan
     assert PERIOD * i < 4.0
 
 
-# the force that the test says it finds, held against pushes of that force
-
-
 GAIN, TAILS, NEEDED, FAST, J = 15.0, 30.0, 10.0, 1e6, np.eye(6, 3)
 
 
@@ -210,7 +207,6 @@ def test_what_no_joint_shows_and_what_tails_forbid_is_never_found():
     free = means_of(np.eye(3))
     assert detectable_force(np.zeros((6, 3)), PERIOD, free, NEEDED, GAIN, TAILS, FAST) == math.inf
     assert detectable_force(J * [1.0, 1.0, 0.0], PERIOD, free, NEEDED, GAIN, TAILS, FAST) == math.inf
-    # with so heavy tails even the largest outlier is no contact
     assert detectable_force(J, PERIOD, free, 60.0, GAIN, 3.0, FAST) == math.inf
 
 

@@ -97,6 +97,7 @@ def _detect(controller: Controller, robot: RobotState) -> None:
 
 def compile_stages() -> None:
     """Compile what is seen and how the arm moves, as much as the detector is, in a process of its own."""
+    FIRST_START.logged = True  # by the process that waits, at the same terminal
     gc.disable()
     controller, robot = _at_rest(profile("pretouch"))
     blocks = controller.fixed.blocks, controller.init(robot).memory.blocks, controller.blank.copy().blocks
@@ -106,7 +107,6 @@ def compile_stages() -> None:
 
 def compile_simulation() -> None:
     """Compile what simulates an arm and its units, in a process of its own."""
-    gc.disable()
     settings, model = LiveSettings(profile=profile("pretouch")), RobotModel(panda())
     Room(settings, live_path(settings), model, paper_skin(model)).tick()
 
