@@ -249,8 +249,8 @@ def test_the_opening_of_three_arms_plays_while_somebody_looks_and_repeats_until_
     assert before < begun + 0.2
     clock.turn(0.1)
     assert simulation.time == before
-    click(clock.page, "Pause")
-    clock.turn(0.1)
+    click(clock.page, "Push the robot's hand")
+    clock.turn(3.0)  # in which the hand goes home
     assert simulation.opening is None
     assert not any(name.endswith("invitation") for name in server.scene._handle_from_node_name)
 

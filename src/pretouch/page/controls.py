@@ -109,12 +109,7 @@ class Controls:
             self._setting(box, self._silence, "silence", partial(self._hears, unit))
 
     def _setting(
-        self,
-        handle: Any,
-        act: Callable[[Any], object],
-        kind: str,
-        current: Callable[[], object],
-        settle: float = 0.0,
+        self, handle: Any, act: Callable[[Any], object], kind: str, current: Callable[[], object], settle: float = 0.0
     ) -> None:
         """Have a control act, where it settles when nobody types in it any more; `current` is what it is to show."""
         when_changed(handle, self._actions, act, kind, settle)

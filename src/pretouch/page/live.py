@@ -107,8 +107,9 @@ class LivePage:
     def _run_actions(self, now: float) -> None:
         simulation, actions = self._simulation, self.actions.take(now)
         if actions:
-            simulation.opening = None  # from the first drag or click on, the page is the visitor's
-            self._untouched = False
+            self._untouched = False  # from the first drag or click on, the page is the visitor's
+            if simulation.opening:
+                simulation.opening.withdraw()
             self._scene.invite("")
         for action in actions:
             if not action.quiet:

@@ -72,6 +72,10 @@ class Opening:
         self.over = going and distance < _HOME_M
         return self._target
 
+    def withdraw(self) -> None:
+        """Have the hand go back now, so that the arm is free for what somebody does."""
+        self._reacted = -np.inf
+
 
 def _units_above(model: RobotModel, skin: Skin) -> float:
     """Mean height above the end-effector, ready posture, of the units that most joints move [m]."""
