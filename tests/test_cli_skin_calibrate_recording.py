@@ -132,10 +132,7 @@ def test_a_skin_file_is_replaced_only_if_that_is_said(panda_model, skin, recorde
 
 @pytest.mark.parametrize(
     ("words", "changes", "said"),
-    [
-        ((), {"units": {}}, "units.mcap holds no IMU data"),
-        (("--topic", "/joint_states"), {}, "--topic needs --joints"),
-    ],
+    [((), {"units": {}}, "units.mcap holds no IMU data"), (("--topic", "/joint_states"), {}, "--topic needs --joints")],
 )
 def test_what_is_missing_is_said(recorded, capsys, read_as, words, changes, said):
     read_as(**changes)

@@ -71,10 +71,7 @@ def test_its_units_are_heard_in_real_time(tmp_path, fr3_model):
         (["--units", "7337"], "give address and port"),
         (["--units", "127.0.0.1:7337"], "needs --keys"),
         (["--hand", "--scene", "static"], "--hand needs --scene empty"),
-        (
-            ["--start", "-0.1,0"],
-            "--start is '-0.1,0': give ready, path, or 7 joint angles between commas",
-        ),
+        (["--start", "-0.1,0"], "--start is '-0.1,0': give ready, path, or 7 joint angles between commas"),
         (["--start", "0,0,0,0.5,0,1,0"], "-3.072 to -0.0698"),
         (["--scene", "static", "--box", "1,1,1:1,1,1"], "--box needs --scene empty"),
         (["--box", "1,1,1"], "give centre and edges, such as 0.5,0.3,0.4:0.3,0.04,0.24"),

@@ -35,10 +35,7 @@ LINES = {
     ],
     WRENCH: ["1 2 :fr3_link0 1 -2 3.25 nan inf -0.5", "0 0 : 0 0 0 0 0 0"],
     RANGE: ["7 8 :forearm_1 1 0.5 0.0625 4 inf 0.25", "0 1 :u 0 0 0 0 -inf nan"],
-    TRAJECTORY: [
-        "0 0 : 2 :j1 :j2 2 2 0.1 0.2 2 1 -1 0 0 0 50000000 2 0.3 0.4 2 0 0 0 0 1 0",
-        "0 0 :base 1 :joint 0",
-    ],
+    TRAJECTORY: ["0 0 : 2 :j1 :j2 2 2 0.1 0.2 2 1 -1 0 0 0 50000000 2 0.3 0.4 2 0 0 0 0 1 0", "0 0 :base 1 :joint 0"],
     TWIST: ["1 2 :panda_link0 0.1 0 -0.25 0 nan 1"],
 }
 

@@ -75,10 +75,7 @@ def test_both_encoders_make_the_same_bytes_and_one_decodes_what_the_other_makes(
 
 def test_names_are_those_of_rmw():
     names = [messages_of("humble").wire_type(kind).__idl_typename__ for kind in (JOINT_STATE, TRAJECTORY)]
-    assert names == [
-        "sensor_msgs::msg::dds_::JointState_",
-        "trajectory_msgs::msg::dds_::JointTrajectory_",
-    ]
+    assert names == ["sensor_msgs::msg::dds_::JointState_", "trajectory_msgs::msg::dds_::JointTrajectory_"]
 
 
 @pytest.mark.parametrize(("sender", "receiver"), [("humble", "jazzy"), ("jazzy", "humble"), ("foxy", "iron")])

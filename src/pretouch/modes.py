@@ -88,12 +88,7 @@ TABLE: tuple[Transition, ...] = (
         "Moving with a contact, but the approach limits allow no motion within the acceleration limits: braking.",
     ),
     Transition(Event.LATCHED, frozenset({Mode.HOLD}), Mode.HOLD, "as before", latches=True),
-    Transition(
-        Event.CONTACT,
-        frozenset({Mode.TRACK, Mode.HOLD}),
-        Mode.REACT,
-        "A contact of {}: the arm yields to it.",
-    ),
+    Transition(Event.CONTACT, frozenset({Mode.TRACK, Mode.HOLD}), Mode.REACT, "A contact of {}: the arm yields to it."),
     Transition(Event.REACTING, _MOVES, Mode.REACT, "Moving with a contact for another {}."),
     Transition(
         Event.CLAMPED,

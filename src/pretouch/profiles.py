@@ -89,19 +89,10 @@ PROFILES: dict[str, Profile] = {
     ),
     "pretouch": Profile(
         name="pretouch",
-        perception=PerceptionParams(
-            self_aside_m=0.03,
-            memory=LocalMapParams(),
-            outside=OutsidePoints(),
-        ),
+        perception=PerceptionParams(self_aside_m=0.03, memory=LocalMapParams(), outside=OutsidePoints()),
         task=TaskParams(mid_joint_projected=True),
         slow=None,
-        approach=BrakingCurve(
-            margin_m=0.03,
-            untouched_s=6.0,
-            closing_deadband_m_s=0.05,
-            tangential=Tangential(),
-        ),
+        approach=BrakingCurve(margin_m=0.03, untouched_s=6.0, closing_deadband_m_s=0.05, tangential=Tangential()),
         null_space=NullSpaceMotion(),
         window=WindowParams(freeze_while_reacting=True),
         detect=SequentialTest(touch=TouchSensorParams(), localise=LocalisationParams()),
@@ -113,9 +104,7 @@ PROFILES: dict[str, Profile] = {
 """Each departure of `pretouch` from the paper is one switch (docs/explanation/detection.md,
 docs/explanation/anticipation.md, docs/explanation/reaction.md)."""
 
-SHORT = {
-    "paper-off": "paper:approach=none",
-}
+SHORT = {"paper-off": "paper:approach=none"}
 """Short names of variants in tables of results."""
 
 

@@ -11,14 +11,7 @@ from scipy.stats import multivariate_normal, multivariate_t
 from tests.contact.alone import means_of
 
 from pretouch.contact.scatter import LENGTHS, LONGEST, window_means
-from pretouch.contact.sequential import (
-    Hypotheses,
-    alarm_bound,
-    explained_by_force,
-    judge,
-    log_ratio,
-    meeting,
-)
+from pretouch.contact.sequential import Hypotheses, alarm_bound, explained_by_force, judge, log_ratio, meeting
 from pretouch.params import SequentialParams
 from pretouch.types import FloatArray
 

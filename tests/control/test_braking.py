@@ -8,12 +8,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from tests.examples import examples
 
-from pretouch.control.braking import (
-    braking_cap,
-    braking_numbers,
-    braking_rows,
-    slots_init,
-)
+from pretouch.control.braking import braking_cap, braking_numbers, braking_rows, slots_init
 from pretouch.params.pretouch import BrakingParams, Tangential
 from pretouch.robot.kinematics import Chain, tangents_of
 from pretouch.types import SEEN_NOW_S, FloatArray, no_obstacles

@@ -137,11 +137,7 @@ def test_poses_of_tables_are_read_by_the_names_that_people_give_them(tmp_path, m
     ("suffix", "text", "sentence"),
     [
         ("csv", CSV.replace("0.06", "0.06,0"), "line 2 has 10 values, and the header has 9"),
-        (
-            "csv",
-            CSV.replace(",", ";").replace("0.06", "0,06"),
-            "line 2: x is '0,06': give a number, with a decimal",
-        ),
+        ("csv", CSV.replace(",", ";").replace("0.06", "0,06"), "line 2: x is '0,06': give a number, with a decimal"),
         ("csv", CSV.replace("qx,qy,qz,qw", "a,b,c,d"), "line 2 has no complete pose: .* it has id, link, x"),
         ("csv", CSV.replace("link,", "where,"), "line 2 names no link: add link, one of base, link1"),
         ("csv", CSV.replace("0.7071068", "0"), "has no complete pose: .* not all zero"),

@@ -3,15 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.perception.obstacles import (
-    TrackState,
-    is_informative,
-    locate,
-    measured,
-    newer,
-    track_init,
-    update_tracks,
-)
+from pretouch.perception.obstacles import TrackState, is_informative, locate, measured, newer, track_init, update_tracks
 from pretouch.sensing.sensor import PAPER_SENSOR, cones_of
 from pretouch.types import RangeStatus
 

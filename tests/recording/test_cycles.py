@@ -33,16 +33,7 @@ from pretouch.recording.ros import (
 )
 from pretouch.recording.simulation import Truth, truth_of
 from pretouch.records import Flat
-from pretouch.types import (
-    Contact,
-    ControlStep,
-    Inputs,
-    Mode,
-    RangeReadings,
-    RobotState,
-    Thresholds,
-    Touched,
-)
+from pretouch.types import Contact, ControlStep, Inputs, Mode, RangeReadings, RobotState, Thresholds, Touched
 from tests.fuzz.invariants import same
 from tests.recording.runs import Run
 

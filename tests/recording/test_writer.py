@@ -210,8 +210,7 @@ def test_a_recording_without_a_step_says_so(controller, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("number", "error"),
-    [(signal.SIGTERM, SystemExit), (signal.SIGHUP, SystemExit), (signal.SIGINT, KeyboardInterrupt)],
+    ("number", "error"), [(signal.SIGTERM, SystemExit), (signal.SIGHUP, SystemExit), (signal.SIGINT, KeyboardInterrupt)]
 )
 def test_a_signal_leaves_a_whole_file_and_is_handled_as_before_once_it_is_closed(controller, tmp_path, number, error):
     before, run = signal.getsignal(number), Run(controller)

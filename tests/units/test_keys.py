@@ -114,8 +114,7 @@ def test_two_units_of_one_name_are_refused():
 
 
 @pytest.mark.parametrize(
-    ("field", "values"),
-    [("id", ["", "a\ud800", "a\n", 5]), ("number", [65536, 1.0]), ("key", [b"", "k" * 32])],
+    ("field", "values"), [("id", ["", "a\ud800", "a\n", 5]), ("number", [65536, 1.0]), ("key", [b"", "k" * 32])]
 )
 def test_a_unit_that_cannot_be_is_refused(field, values):
     for value in values:

@@ -11,20 +11,7 @@ from pathlib import Path
 import grimp
 
 PARTICIPLES = frozenset(
-    {
-        "found",
-        "said",
-        "told",
-        "made",
-        "kept",
-        "given",
-        "asked",
-        "wanted",
-        "known",
-        "shown",
-        "taken",
-        "held",
-    }
+    {"found", "said", "told", "made", "kept", "given", "asked", "wanted", "known", "shown", "taken", "held"}
 )
 """Names of variables that describe what was done to a value, instead of the value."""
 

@@ -80,11 +80,7 @@ class ServeFci(FciOptions):
 
     def run(self) -> None:
         """Serve until interrupted, or, if asked to, until the first client has gone."""
-        with (
-            ServedArm(_setup(self)) as arm,
-            _truth(self.truth) as watch,
-            FciServer(arm, self, watch, say) as server,
-        ):
+        with ServedArm(_setup(self)) as arm, _truth(self.truth) as watch, FciServer(arm, self, watch, say) as server:
             host, port = server.address
             pace = "lockstep" if self.lockstep else "real time"
             gripper = f"gripper at port {server.gripper_address[1]}"

@@ -75,10 +75,7 @@ class MotionLimits:
         A joint beyond a limit of its position that stands or goes back is no error.
         """
         leaves = ((q > self.q_max) & (qd > _STANDS)) | ((q < self.q_min) & (qd < -_STANDS))
-        errors = {
-            "joint_position_limits_violation": leaves,
-            "joint_velocity_violation": np.abs(qd) > self.qd,
-        }
+        errors = {"joint_position_limits_violation": leaves, "joint_velocity_violation": np.abs(qd) > self.qd}
         return tuple(name for name, wrong in errors.items() if wrong.any())
 
     def braked(self, qd: FloatArray) -> FloatArray:

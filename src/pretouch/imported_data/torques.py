@@ -7,17 +7,7 @@ import numpy as np
 import scipy  # its parts load when they are first used: a quarter of a second that a help does not wait
 
 from pretouch.errors import RecordingError
-from pretouch.imported_data.log import (
-    TORQUES,
-    Choice,
-    ImportedRecording,
-    Log,
-    Note,
-    check_reach,
-    gaps,
-    listed,
-    pieces,
-)
+from pretouch.imported_data.log import TORQUES, Choice, ImportedRecording, Log, Note, check_reach, gaps, listed, pieces
 from pretouch.importing.mounting import (
     LEAN_DEG,
     direction_text,

@@ -169,8 +169,7 @@ def _cone_meets(sensors: Sensors, k: int, capsules: Capsules, c: int, edge: Floa
     mixed = x * ux + y * uy + z * uz - start * rise
     slope = max(0.0, ux * ux + uy * uy + uz * uz - rise * rise)
     least = min(
-        cos * np.sqrt(across) - sin * start,
-        cos * np.sqrt(max(0.0, across + 2 * mixed + slope)) - sin * (start + rise),
+        cos * np.sqrt(across) - sin * start, cos * np.sqrt(max(0.0, across + 2 * mixed + slope)) - sin * (start + rise)
     )
     # The slope vanishes where l cos grows as fast as z sin. With spread <= 0 it does so nowhere: the axis is closer to
     # the beam's direction than the edge of the cone is, and the least value is at an end.

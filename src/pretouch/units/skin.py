@@ -88,13 +88,7 @@ def _received(record: bytes) -> Received:
 class NetworkSkin:
     """Sensor units on the network, as a `Skin`. `with` closes it."""
 
-    def __init__(
-        self,
-        units: NetworkUnits | Sequence[str],
-        keys: Keys,
-        host: str = "127.0.0.1",
-        port: int = 0,
-    ) -> None:
+    def __init__(self, units: NetworkUnits | Sequence[str], keys: Keys, host: str = "127.0.0.1", port: int = 0) -> None:
         """Start a `SkinReceiver`; one that cannot listen is a HardwareError."""
         network = NetworkUnits.of(units)
         keyed = keys_of(network.ids, keys)

@@ -40,10 +40,7 @@ from pretouch.robot.postures import spread
 from pretouch.sensing.skin import Skin
 from pretouch.types import FloatArray
 
-JERK = {
-    "panda": np.array([7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0]),
-    "fr3": np.full(7, 5000.0),
-}
+JERK = {"panda": np.array([7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0]), "fr3": np.full(7, 5000.0)}
 """Largest jerk of each joint [rad/s^3]: `kMaxJointJerk` in `rate_limiting.h` of libfranka 0.9, and 0.21 for the FR3."""
 
 _ARMS = {"panda": panda, "fr3": fr3}
