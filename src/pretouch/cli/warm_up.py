@@ -49,7 +49,7 @@ def kept_in() -> str:
 
 
 def prepare(chosen: Profile) -> None:
-    """Compile a step of a profile where that is not kept yet, in two processes, and say so on the standard error.
+    """Compile a step of a profile, and a simulated arm, where that is not kept yet, in two processes; say so on stderr.
 
     What the other process does not come to, or what cannot be kept, is compiled where it is first needed.
     """

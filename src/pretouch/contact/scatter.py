@@ -225,12 +225,12 @@ def learn_level(log_r: float, maxima: FloatArray) -> None:
 HELD_S = 0.1
 """Duration of the force [s]."""
 _SURE = 1.725
-"""Deviations above the force for half of all cases, Student's with 20 degrees of freedom: 95 % are below."""
+"""Deviations above the force for half of all cases: 95 % of Student's, with the default `tails` of 20, are below."""
 
 
 @kernel
 def detectable_force(
-    J: FloatArray, period: float, means: WindowMeans, needed: float, gain: float, tails: float, observer_gain: float
+    J: FloatArray, period: float, means: WindowMeans, needed: float, gain: float, tails: float, rate: float
 ) -> float:
     """Return the force at the end-effector found in 95 of 100 cases if it lasts for `HELD_S` [N], infinite for none.
 
@@ -241,12 +241,12 @@ def detectable_force(
         needed: ln of the likelihood ratio of one hypothesis in one window for an alarm.
         gain: g, ratio of a contact's spread to that of free motion.
         tails: degrees of freedom of the Student distribution.
-        observer_gain: of the torques [1/s], which show the force so late.
+        rate: gain of the observer [1/s], whose torques show the force late.
     """
     k, n = 0, J.shape[1]
     while k + 1 < len(LENGTHS) and LENGTHS[k + 1] * period <= HELD_S:
         k += 1
-    S, L, A, V = np.empty((n, n)), np.zeros((n, n)), np.empty((3, n)), np.empty((3, 3))
+    S, L, A, V = np.empty((n, n)), np.zeros((n, n)), np.empty((3, n)), np.zeros((3, 3))
     # a shorter mean has more noise, and a longer window is not full while the force lasts
     covariance_of_mean(means, k, S)
     if not factor(S, L):
@@ -256,11 +256,11 @@ def detectable_force(
         forward(L, J[a, ::-1].copy(), A[a])  # the last joint first
     for a in range(3):
         for b in range(3):
-            V[a, b] = -(A[a] * A[b]).sum()
-    least, squares = -largest_eigenvalue(V), _squares(needed, n, gain, tails)
-    # 1 - exp(-t g) of the force is shown; its mean over the last window within `HELD_S`
-    late = observer_gain * LENGTHS[k] * period, observer_gain * HELD_S
-    part = 1.0 - (math.exp(late[0] - late[1]) - math.exp(-late[1])) / late[0]
+            for j in range(n):
+                V[a, b] -= A[a, j] * A[b, j]
+    least, squares, width = -largest_eigenvalue(V), _squares(needed, n, gain, tails), LENGTHS[k] * period
+    # 1 - exp(-t rate) of the force is shown; its mean over the last window within `HELD_S`
+    part = 1.0 - (math.exp(rate * (width - HELD_S)) - math.exp(-rate * HELD_S)) / (rate * width)
     return (math.sqrt(squares) + _SURE) / (part * math.sqrt(least)) if least > 0.0 else np.inf
 
 

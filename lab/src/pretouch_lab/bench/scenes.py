@@ -1,4 +1,4 @@
-"""Scenario files, fixed by checksums before any detector was built, and arms and skins by name."""
+"""Scenario files, fixed by checksums, and arms and skins by name."""
 
 import tomllib
 from collections.abc import Iterator

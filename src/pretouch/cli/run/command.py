@@ -41,7 +41,7 @@ class UsualOptions(Generic[A]):
 
 @dataclass(frozen=True)
 class Run(UsualOptions[A]):
-    """Move an arm; the exit code is 1 if the run ended early or its recording failed, 2 if it was refused before."""
+    """Move an arm; the exit code is 1 if the run ended early or its recording failed, 2 if refused before a motion."""
 
     robot: RobotOptions
     units: SkinOptions
