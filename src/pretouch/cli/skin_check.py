@@ -109,7 +109,7 @@ def delays(samples: Sequence[Received]) -> FloatArray:
     time, _, distance = _frames(samples)
     imu = by_time(unit_trace([replace(one, offset=0.0, bound=0.0) for one in samples]).imu)
     if len(imu.stamp) < 100:
-        raise HardwareError("The unit sent no samples of an IMU, which its motion is to be known by: check its wiring.")
+        raise HardwareError("Of the motion, the IMU was not heard for a full second: check its wiring and the network.")
     grid = np.arange(imu.stamp[0], imu.stamp[-1], _GRID_S)
     f, a = np.fft.rfftfreq(len(grid), _GRID_S), np.interp(grid, imu.stamp, imu.acceleration[:, 2])
     inside = (f > _SLOW_HZ) & (f < _FAST_HZ)
@@ -125,7 +125,7 @@ def delays(samples: Sequence[Received]) -> FloatArray:
             at = time[use] - lag
             columns = np.column_stack([np.interp(at, grid, x), np.interp(at, grid, v), slow[use]])
             along, rate, *_ = np.linalg.lstsq(columns, d[use])[0]
-            lag -= rate / along
+            lag -= rate / along if along else 0.0  # 0: it did not move at all
         late[zone] = lag if abs(along + 1.0) < 0.4 else np.nan
     return late
 
