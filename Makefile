@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 LIVE := $(VENV)/.installed-live
 
-.PHONY: setup demo live franka learn cluster ros2 units meshes browser docs micropython test test-quick test-contracts test-skipped test-slow soak golden golden-values lint house bench peers \
+.PHONY: setup demo live franka learn ros2 units meshes browser docs micropython test test-quick test-contracts test-skipped test-slow soak golden golden-values lint house bench peers \
 	format wheel clean
 
 setup: $(STAMP)
@@ -38,10 +38,6 @@ franka: setup
 # Gymnasium, for the environment of the lab
 learn: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e './lab[learn]'
-
-# dask, for trials on the workers of its scheduler
-cluster: setup
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e './lab[cluster]'
 
 # what writes to sensor units over USB
 units: setup
@@ -85,7 +81,7 @@ test-quick: setup
 # the files in which the last `make test` skipped something, with the real libraries, and the page in a browser
 test-contracts: setup
 	@test ! -s build/skipped || $(PYTEST) -n 2 --dist worksteal -m "not slow" \
-		--skip-only="make meshes,make learn,make cluster" $$(cat build/skipped)
+		--skip-only="make meshes,make learn" $$(cat build/skipped)
 	$(PYTEST) -n 2 --dist worksteal -m "not alone" --skip-only= tests/page/test_page_in_browser.py
 
 # the same files once all that they need is installed: nothing may be skipped now

@@ -11,7 +11,6 @@ from pretouch import cli, plugins
 from pretouch.cli.app import GROUP, command_class, commands_of
 from pretouch.extras import LAB
 from pretouch_lab.learning import LEARN
-from pretouch_lab.run import CLUSTER
 from pretouch_lab.sweep import SWEEP
 
 PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
@@ -26,7 +25,7 @@ def test_it_is_of_the_products_version_and_its_commands_are_those_the_product_na
         assert command_class(name) is not None
 
 
-@pytest.mark.parametrize("extra", [CLUSTER, LEARN, SWEEP], ids=lambda extra: extra.name)
+@pytest.mark.parametrize("extra", [LEARN, SWEEP], ids=lambda extra: extra.name)
 def test_an_extra_is_one_that_the_distribution_has_and_make_installs(extra):
     assert extra.name in PROJECT["optional-dependencies"]
     assert f"\n{extra.target}: " in (Path(__file__).parents[2] / "Makefile").read_text()

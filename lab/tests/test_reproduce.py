@@ -1,21 +1,18 @@
 """What a reproduction is made of: cells, options, recordings, and all of the paper."""
 
-import json
 import re
 from dataclasses import replace
 
 import pytest
-from tests.needs import skip_without
 
-from pretouch import cli
 from pretouch.errors import ExperimentError, SkinError
 from pretouch.sensing.skin import PAPER_SKIN
 from pretouch_lab import experiment as lab_experiment
 from pretouch_lab.cli.reproducing import compared, whole_paper
 from pretouch_lab.experiment import NAMES, arguments, controllers, experiment, play, recording_file
-from pretouch_lab.experiments import between, static
-from pretouch_lab.options import Playing, TrialOptions
-from pretouch_lab.run import CLUSTER, open_run
+from pretouch_lab.experiments import static
+from pretouch_lab.options import TrialOptions
+from pretouch_lab.run import open_run
 
 
 def test_cells_are_all_values_for_each_controller_in_its_modes_that_the_experiment_is_about():
@@ -97,29 +94,7 @@ def test_the_trials_that_are_wanted_are_recorded(tmp_path, monkeypatch, record, 
     assert len(list((tmp_path / "recordings").iterdir())) == len(kept)
 
 
-def test_a_schedulers_workers_are_told_whole_paths(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    how = Playing("out", scheduler="tcp://127.0.0.1:1")
-    assert how.folder("x") == tmp_path / "out"
-    names = ("", "panda", "realistic", "arm/robot.toml")
-    assert [how.input(name) for name in names] == [*names[:3], str(tmp_path / names[3])]
-
-
 def test_rows_of_a_world_say_it(tmp_path, monkeypatch):
     monkeypatch.setattr(static, "EXPERIMENT", replace(static.EXPERIMENT, trial=lambda *_: ({}, None)))
     rows = [play("static", TrialOptions(world=world), tmp_path, {"place": "here"}, 1) for world in ("", "stress")]
     assert rows == [{}, {"world": "stress"}]
-
-
-def test_a_schedulers_workers_play_a_trial_as_this_process_does(tmp_path, context):
-    skip_without(CLUSTER)
-    from distributed import LocalCluster
-
-    out = tmp_path / "out"
-    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0") as cluster:
-        words = ["reproduce", "between", "--profiles", "paper", "--seeds", "1", "--out", str(out)]
-        assert cli.main([*words, "--scheduler", cluster.scheduler_address]) == 0
-    (row,) = map(json.loads, (out / "rows.jsonl").read_text().splitlines())
-    cell = {"profile": "paper", "restrictions": "slack"}
-    assert row == cell | {"seed": 0} | between.trial(cell, 0, context)[0]
-    assert recording_file(out, cell, 0).exists()

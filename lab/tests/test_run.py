@@ -1,4 +1,4 @@
-"""Plays whose rows a later run continues, in this process, in worker processes, and on a real cluster."""
+"""Plays whose rows a later run continues, in this process and in worker processes."""
 
 import json
 import os
@@ -10,11 +10,10 @@ from contextlib import suppress
 from functools import partial
 
 import pytest
-from tests.needs import skip_without
 
 from pretouch.errors import ExperimentError
 from pretouch_lab import run as lab_run
-from pretouch_lab.run import CLUSTER, ROWS, missing, open_run, plays_of, run, workers
+from pretouch_lab.run import ROWS, missing, open_run, plays_of, run, workers
 
 CELLS = [{"name": "a", "factor": 2.0}, {"name": "b", "factor": 0.5}]
 
@@ -154,22 +153,3 @@ def test_a_stopped_run_keeps_its_rows_and_leaves_no_worker(tmp_path, number):
             os.killpg(process.pid, 0)
             time.sleep(0.05)
         pytest.fail("a worker is left")
-
-
-def test_a_schedulers_workers_play_and_one_that_does_not_answer_is_named(tmp_path, monkeypatch):
-    skip_without(CLUSTER)
-    from distributed import LocalCluster
-
-    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0") as cluster:
-        with workers(scheduler=cluster.scheduler_address) as (executor, at_once):
-            assert at_once == 4
-            rows = run(played, plays_of(CELLS, range(20)), tmp_path, executor, at_once)
-        assert rows == run(played, plays_of(CELLS, range(20)), tmp_path / "here")
-        with (
-            pytest.raises(ExperimentError, match="or a worker of it was killed"),
-            workers(scheduler=cluster.scheduler_address) as pool,
-        ):
-            run(killed, [(CELLS[1], 77)], tmp_path, *pool)
-    monkeypatch.setattr(lab_run, "_CONNECT_S", 0.5)
-    with pytest.raises(ExperimentError, match="No dask scheduler answers at tcp:"):
-        workers(scheduler="tcp://127.0.0.1:1").__enter__()

@@ -70,22 +70,10 @@ class Playing:
     json: JsonFile = None
     processes: int | None = None
     """Worker processes; by default one for each processor."""
-    scheduler: str = ""
-    """Address of a dask scheduler, tcp://HOST:PORT, whose workers play the trials. They need the same folder --out and
-    the same files."""
 
     def folder(self, name: str) -> Path:
         """Return the folder for the results: --out, or one under runs/."""
-        place = Path(self.out or f"runs/{name}")
-        return place.absolute() if self.scheduler else place
-
-    def input(self, name: str) -> str:
-        """Return the name or absolute path of an arm, skin or world: a scheduler's workers run in another folder."""
-        from pretouch.robot.description import ROBOTS
-        from pretouch_lab.domain_randomisation import SETS
-
-        whole = self.scheduler and name and name not in (*ROBOTS, *SETS)
-        return str(Path(name).absolute()) if whole else name
+        return Path(self.out or f"runs/{name}")
 
 
 @dataclass(frozen=True)

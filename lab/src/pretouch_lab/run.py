@@ -12,7 +12,7 @@ import signal
 import subprocess
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent import futures
-from concurrent.futures import CancelledError, Executor, Future
+from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from itertools import islice
 from multiprocessing import active_children, get_context, parent_process
@@ -24,13 +24,9 @@ from pretouch import __version__
 from pretouch.atomic_write import write_json
 from pretouch.cli.writing import plain
 from pretouch.errors import ExperimentError
-from pretouch.extras import Extra
 from pretouch.signals import kept_from_children, leave_to_parent, noted
 
-CLUSTER = Extra("cluster", ("distributed",), "cluster", "pretouch-lab")
 ROWS, RUN = "rows.jsonl", "run.json"
-_CONNECT_S = 10.0
-"""Time limit for a scheduler's answer [s]."""
 
 Row = dict[str, Any]
 """Result of one play or of several: plain values by name."""
@@ -183,20 +179,14 @@ def _played(
 
 
 @contextmanager
-def workers(processes: int | None = None, scheduler: str = "") -> Iterator[tuple[Executor | None, int]]:
+def workers(processes: int | None = None) -> Iterator[tuple[Executor | None, int]]:
     """Yield an executor and the number of plays it takes at once: `run(..., *workers)`.
 
     Args:
         processes: worker processes of this machine; None: one for each processor; 1: this process itself.
-        scheduler: address of a dask scheduler, `tcp://HOST:PORT`, whose workers play instead. They need this package in
-            the same version, and access to the folder of the results if recordings are written there.
     """
     if processes is not None and processes < 1:
         raise ExperimentError(f"The number of processes is {processes}: give 1 or more.")
-    if scheduler:
-        with _cluster(scheduler) as cluster:
-            yield cluster
-        return
     count = processes or os.cpu_count() or 1
     if count == 1:
         yield None, 1
@@ -210,29 +200,6 @@ def workers(processes: int | None = None, scheduler: str = "") -> Iterator[tuple
         pool.shutdown(wait=True, cancel_futures=True)
         raise
     pool.shutdown()
-
-
-@contextmanager
-def _cluster(scheduler: str) -> Iterator[tuple[Executor, int]]:
-    CLUSTER.need("--scheduler")
-    from distributed import Client, KilledWorker
-    from distributed.comm import CommClosedError
-
-    try:
-        client = Client(scheduler, timeout=_CONNECT_S)
-    except (OSError, ValueError) as error:
-        raise ExperimentError(
-            f"No dask scheduler answers at {scheduler} ({error}): start one by `dask scheduler`, or omit --scheduler."
-        ) from error
-    with client:
-        try:
-            # two for each thread, so that no thread waits while a row travels; workers may also join later
-            yield client.get_executor(), max(1, 2 * sum(client.nthreads().values()))
-        except (KilledWorker, CancelledError, CommClosedError) as error:
-            raise ExperimentError(
-                f"The scheduler at {scheduler} is gone, or a worker of it was killed ({error}). All finished plays are"
-                " kept: run the same command with the same --out to go on."
-            ) from error
 
 
 def _start() -> None:

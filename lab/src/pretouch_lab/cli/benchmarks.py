@@ -62,7 +62,7 @@ def _finished(
 def detection(options: lab_options.DetectionOptions) -> dict[str, Any]:
     """See its options."""
     out = _folder(options, "detection", quick=options.quick)
-    arms = detecting.plays(options.seeds, options.quick, options.input(options.world))
+    arms = detecting.plays(options.seeds, options.quick, options.world)
     numbers = results(detecting.rows_of(played("detection", detecting.trial, arms, out, options)))
     return _finished(options, "detection", out, tables(numbers), numbers["resolution"], **numbers)
 
@@ -76,7 +76,7 @@ def avoidance(options: lab_options.AvoidanceOptions) -> dict[str, Any]:
         other = {"arm": options.arm, "arm_sha256": files_digest(described)}
         print(place(options.arm).sentence(described.name), assumed_plant(described), sep="\n")
     out = _folder(options, "avoidance", **other)  # a quick run shares its trials with a full one
-    trial = partial(avoiding.trial, options.input(options.world), options.input(options.arm))
+    trial = partial(avoiding.trial, options.world, options.arm)
     summary = avoiding.summarise(played("avoidance", trial, trials, out, options))
     result_tables, cells = avoiding.tables(summary), summary.pop("cells")
     counts = [cell["trials"] for cell in cells]
@@ -125,7 +125,7 @@ def calibration(options: lab_options.CalibrationOptions) -> dict[str, Any]:
     begin(options, out, {"bench": "calibration", **described, "motion": repr(options.motion)})
     plan = plan_motion(model, options.motion)
     trials = plays_of([{"find_links": options.find_links}], range(options.seed, options.seed + options.skins))
-    rows = played("skins", partial(calibrating.trial, options.input(options.arm), plan), trials, out, options)
+    rows = played("skins", partial(calibrating.trial, options.arm, plan), trials, out, options)
     result_tables = calibrating.tables(rows, plan.duration)
     report(result_tables, [], out)
     return {"rows": rows, "motion_s": plan.duration, "tables": result_tables}

@@ -43,7 +43,7 @@ def played(name: str, trial: Trial, plays: Sequence[Play], out: Path, how: Playi
         return run(trial, plays, out)
     try:
         processes = (os.cpu_count() or 1) if how.processes is None else how.processes
-        with workers(min(processes, left), how.scheduler) as pool, bar(name, len(plays), len(plays) - left) as advance:
+        with workers(min(processes, left)) as pool, bar(name, len(plays), len(plays) - left) as advance:
             return run(trial, plays, out, *pool, done=advance)
     except BaseException as error:
         if not isinstance(error, PretouchError):

@@ -91,8 +91,7 @@ def reproduce(parts: list[Part], folder: Path, how: Playing) -> None:
             begin(how, folder / where, arguments(name, options))
         rows: dict[str, list[Row]] = {}
         for (where, name, options), own in zip(parts, plays, strict=True):
-            skin, arm, world = map(how.input, (options.skin, options.arm, options.world))
-            trial = partial(play, name, replace(options, skin=skin, arm=arm, world=world), folder / where)
+            trial = partial(play, name, options, folder / where)
             rows[name] = rows.get(name, []) + played(where or name, trial, own, folder / where, how)
         tables = [table for name, own in rows.items() for table in experiment(name).tables(own)]
         figures = [each for part in parts for each in _figure_of(*part, folder, rows[part[1]])]

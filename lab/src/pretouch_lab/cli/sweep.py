@@ -34,7 +34,7 @@ class Sweep(Playing, SweepOptions):
         from pretouch_lab.domain_randomisation import named_set
         from pretouch_lab.sweep import EXPERIMENTS, SWEEP, results_of, sobol_figure, sweep_of, tables, trial
 
-        vary, fix = self._pairs("vary", self.vary), self._pairs("fix", self.fix)
+        vary, fix = _pairs("vary", self.vary), _pairs("fix", self.fix)
         sweep = sweep_of(self, vary, fix)
         metrics = self.metrics or EXPERIMENTS[sweep.experiment].metrics
         if wrong := [name for name in metrics if name not in EXPERIMENTS[sweep.experiment].metrics]:
@@ -61,12 +61,13 @@ class Sweep(Playing, SweepOptions):
             about = {"version": __version__, "experiment": sweep.experiment, "profile": sweep.profile}
             write(about | {"vary": vary, "fixed": fix, "results": results})
 
-    def _pairs(self, option: str, texts: list[str]) -> dict[str, str]:
-        """Read NAME=TEXT, each name once; paths of worlds become absolute for workers elsewhere."""
-        pairs: dict[str, str] = {}
-        for text in texts:
-            name, equals, value = text.partition("=")
-            if not equals or name in pairs:
-                raise ExperimentError(f"--{option} {text} has no value, or names {name} twice: write NAME=VALUE once.")
-            pairs[name] = ",".join(map(self.input, value.split(","))) if name == "plant.world" else value
-        return pairs
+
+def _pairs(option: str, texts: list[str]) -> dict[str, str]:
+    """Read NAME=TEXT, each name once."""
+    pairs: dict[str, str] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals or name in pairs:
+            raise ExperimentError(f"--{option} {text} has no value, or names {name} twice: write NAME=VALUE once.")
+        pairs[name] = value
+    return pairs
