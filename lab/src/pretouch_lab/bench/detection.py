@@ -116,9 +116,7 @@ def judged_contacts(steps: Steps, touches: list[Touching], contender: Contender)
     stream, replayed = steps.stream, steps.replay(contender)
     matches = matched(touches, stream.stamp, replayed.onsets())
     swept = [matched(touches, stream.stamp, replayed.onsets(value)) for value in sweep_values(contender)]
-    # spread of each joint's torque in free motion before the first contact, once the arm has moved for a while
-    quiet = (stream.stamp >= 0.5 * touches[0].start) & (stream.stamp < touches[0].start)
-    noise = stream.robot["tau_ext"][quiet].std(axis=0)
+    noise = quiet_noise(touches, stream)
     contacts = [
         {
             **about(touch, stream, noise),
@@ -151,6 +149,19 @@ def matched(touches: list[Touching], stamp: FloatArray, onsets: list[int]) -> li
     return matches
 
 
+def quiet_noise(touches: list[Touching], stream: Stream) -> FloatArray:
+    """Return the spread (n,) [Nm] of torques before the first contact, once the arm has moved for a while."""
+    quiet = (stream.stamp >= 0.5 * touches[0].start) & (stream.stamp < touches[0].start)
+    return np.asarray(stream.robot["tau_ext"][quiet].std(axis=0))
+
+
+def torques_of(touch: Touching, stream: Stream, step: int) -> FloatArray:
+    """Return the joint torques (n,) [Nm] that 1 N of a contact causes in a step."""
+    kin = model().kinematics(stream.robot["q"][step])
+    rotation, origin = kin.rotation[touch.link], kin.position[touch.link]
+    return (rotation @ touch.inwards) @ model().jacobian(kin, touch.link, origin + rotation @ touch.point)[:3]
+
+
 def about(touch: Touching, stream: Stream, noise: FloatArray) -> dict[str, Any]:
     """Return place, kind and force of a contact, and flags: seen by the skin, torques above the noise."""
     family = scenario("contacts")
@@ -160,8 +171,7 @@ def about(touch: Touching, stream: Stream, noise: FloatArray) -> dict[str, Any]:
     rotation, origin = kin.rotation[touch.link], kin.position[touch.link]
     hand = origin + rotation @ (touch.point + touch.hand_radius * touch.normal)
     away = np.linalg.norm(stream.obstacle_points(step) - hand, axis=1).min(initial=np.inf) - touch.hand_radius
-    jacobian = model().jacobian(kin, touch.link, origin + rotation @ touch.point)[:3]
-    torque = np.abs(jacobian.T @ (touch.force_n * (rotation @ touch.inwards)))
+    torque = touch.force_n * np.abs(torques_of(touch, stream, step))
     return {
         "link": model().links[touch.link].removeprefix(f"{model().description.name}_"),
         "kind": kinds[touch.kind]["name"],
@@ -184,7 +194,4 @@ def towards(match: Match, touch: Touching, stream: Stream, replayed: Replayed) -
     if not len(moving):
         return False
     step = match[1] + int(moving[0])
-    kin = model().kinematics(stream.robot["q"][step])
-    rotation = kin.rotation[touch.link]
-    there = model().jacobian(kin, touch.link, kin.position[touch.link] + rotation @ touch.point)[:3]
-    return bool((rotation @ touch.inwards) @ there @ replayed.motion[step] < 0.0)
+    return bool(torques_of(touch, stream, step) @ replayed.motion[step] < 0.0)
