@@ -20,7 +20,7 @@ from pretouch_lab.bench.pushes import RealPushes, in_any_direction, pushed, star
 from pretouch_lab.bench.real import alarms, contacts, delays, halves, parted, tables, trial
 from pretouch_lab.bench.real_sets import SETS, RealRun, corrected, files_digest, sets_in, stream_of
 
-FRANKA, LWR4, _, UR10E, GLOVE = SETS
+FRANKA, LWR4, _, UR10E, _, GLOVE = SETS
 PUSH = (3.0, 0.5, "panda_link5", (0.0, 30.0, 0.0))
 
 

@@ -143,9 +143,8 @@ SETS = (
     RealSet(
         "rokae_yl", "xmate", "rokae_yl.npz", "YanjunLIU-ac/Dynamic_Parameter_Identification_for_Rokae_xMate", _of_arrays
     ),
-    RealSet(
-        "ur10e_contact", "ur10e", "ur10e_contact.npz", "shamilmamedov/dynamic_calibration", _of_arrays, of_currents=True
-    ),
+    RealSet("ur10e_contact", "ur10e", "ur10e_contact.npz", "shamilmamedov/dynamic_calibration", _of_arrays, True),
+    RealSet("ur3_joints", "ur3", "ur3_joints.npz", "PedroSaman/UR3-Modelation", _of_arrays, True),
     RealSet("contactInterpretation", "panda", "contactInterpretation/link*/*.csv", _GLOVE_SOURCE, _of_glove),
 )
 """All sets. None is part of this package: their repositories on GitHub state no licence, or LGPL-3."""
