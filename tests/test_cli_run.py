@@ -112,8 +112,7 @@ def test_an_arm_that_does_not_come_with_the_package_has_its_path_placed_and_that
     given = run_setup(Simulated(), RobotOptions(arm=folder), SkinOptions(), task)
     assert given.floor == -0.2
     assert len(given.assumed) == 1  # of the simulated arm, not of a path that is given
-    usual = run_setup(Simulated(), RobotOptions(), SkinOptions(), TaskOptions())
-    assert usual.assumed == ()
+    assert run_setup(Simulated(), RobotOptions(), SkinOptions(), TaskOptions()).assumed == ()
 
 
 @pytest.mark.slow

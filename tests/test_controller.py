@@ -31,8 +31,7 @@ def test_the_arm_follows_its_path_at_the_speed_asked(arm: Arm):
     steps = arm.run(60)
     assert {s.mode for s in steps} == {Mode.TRACK}
     np.testing.assert_allclose(speed(arm, steps[-1]), [0.0, 0.3, 0.0], atol=0.01)
-    off = np.linalg.norm(steps[-1].ee_position - steps[-1].path_position)
-    assert off < 0.01
+    assert np.linalg.norm(steps[-1].ee_position - steps[-1].path_position) < 0.01
     # the phase is what was travelled: 60 cycles of 0.01 s at 0.3 m/s
     assert steps[-1].path_phase - steps[0].path_phase == pytest.approx(59 * 0.003, rel=0.02)
 

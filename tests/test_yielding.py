@@ -139,8 +139,7 @@ def test_the_link_that_is_pushed_goes_with_the_push(arm: Pushed, link: str, forc
 
 
 def test_caught_between_two_things_it_opens_the_way_it_came_and_holds_until_resumed(arm: Pushed):
-    steps = caught(arm)
-    assert "Clamped between two objects" in steps[-1].reason
+    assert "Clamped between two objects" in caught(arm)[-1].reason
     start = arm.ee()[1]
     opening = arm.run(40)
     assert modes(opening) == {Mode.REACT}

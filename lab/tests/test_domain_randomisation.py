@@ -8,7 +8,8 @@ from pretouch.profiles import profile
 from pretouch.sim.scene import SceneSpec
 from pretouch_lab.cli import benchmarks
 from pretouch_lab.domain_randomisation import folder_part, sentence
-from pretouch_lab.experiment import arguments
+from pretouch_lab.experiment import arguments, context_of
+from pretouch_lab.experiments import static
 from pretouch_lab.options import DetectionOptions, TrialOptions
 from pretouch_lab.run import open_run
 from pretouch_lab.trial import Setup, randomised
@@ -25,8 +26,14 @@ def test_a_world_changes_arm_sensors_and_what_is_believed_of_the_skin(panda_mode
     again = randomised(replace(plain, world="realistic"))
     assert again.plant == setup.plant
     assert (again.believed.T_link_sensor == setup.believed.T_link_sensor).all()
-    set_by_hand = replace(plain, believed=paper_skin, world="stress")  # as an experiment sets it, which stays
-    assert randomised(set_by_hand).believed is paper_skin
+    assert randomised(replace(plain, believed=paper_skin, world="stress")).believed is paper_skin
+
+
+def test_the_nominal_world_plays_as_the_usual_one():
+    context, cell = context_of("", "", ""), static.cells(TrialOptions())[0]
+    usual, _ = static.trial(cell, 1003, context)
+    assert static.trial(cell, 1003, replace(context, world="nominal"))[0] == usual
+    assert static.trial(cell, 1003, replace(context, world="realistic"))[0] != usual
 
 
 def test_runs_of_two_worlds_and_of_a_file_that_changed_do_not_share_a_folder(tmp_path):

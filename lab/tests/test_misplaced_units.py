@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.sim.paper_scenes import static_path, static_scene
+from pretouch.sim.scene import SceneSpec
 from pretouch_lab.domain_randomisation import Misplacement, misplaced
 from pretouch_lab.trial import Setup, play
 
@@ -69,3 +70,10 @@ def test_units_measure_where_they_are_and_an_arm_works_and_replays_by_what_it_is
     verdict = verify(recorded)
     assert verdict.checked == len(wrong.steps)
     assert verdict.agrees
+
+
+def test_an_arm_that_believes_the_truth_does_as_if_it_were_told_nothing(context):
+    setup = context.setup({"profile": "paper:approach=none"}, 2, SceneSpec(), static_path("line", "+y"))
+    same = replace(setup, believed=misplaced(context.skin, context.model, Misplacement(), 2))
+    commands = [[s.command.tobytes() for s in one_step(s, 30).steps] for s in (setup, same)]
+    assert commands[0] == commands[1]

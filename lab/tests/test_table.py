@@ -80,6 +80,5 @@ def test_columns_write_what_they_declare():
         "2.0\n1.0->": Column("", "open", 1, band=True),
         ">": Column("", "one", 1, band=True),
     }
-    made = table("Title", [*columns.values()], [row], "Note.")
-    assert made.rows == (tuple(columns),)
+    assert table("Title", [*columns.values()], [row], "Note.").rows == (tuple(columns),)
     assert [short(value) for value in (0.123, 9.96, 123.4)] == ["0.12", "10", "123"]

@@ -41,6 +41,13 @@ def test_every_draw_is_within_its_range_and_has_a_source(name):
         assert 0.0 <= world.misplaced.position_mm <= by_name["misplaced.position_mm"].ends[1]
 
 
+def test_stress_reaches_farther_than_realistic():
+    wide, narrow = ({field: s.ends for field, s in world_set(name).spreads.items()} for name in ("stress", "realistic"))
+    assert set(wide) == set(narrow)
+    for name in narrow:
+        assert wide[name][0] <= narrow[name][0] or wide[name][1] > narrow[name][1], name
+
+
 def test_a_field_is_drawn_alike_whatever_else_is(tmp_path):
     one, both = tmp_path / "one.toml", tmp_path / "both.toml"
     one.write_text("[plant.mass_error]\nuniform = [0.0, 0.1]\n")
@@ -53,8 +60,7 @@ def test_a_field_is_drawn_alike_whatever_else_is(tmp_path):
 def test_what_an_experiment_varies_stays():
     world, usual = drawn(world_set("stress"), 1003), plant_params_of(panda())
     own = replace(usual, payload_max_kg=0.33)
-    merged = with_own(world.plant, own, usual)
-    assert merged == replace(world.plant, payload_max_kg=0.33)
+    assert with_own(world.plant, own, usual) == replace(world.plant, payload_max_kg=0.33)
     ranging = with_own(world.ranging, RangeFinderParams(dropout=0.9), RangeFinderParams())
     assert ranging == replace(world.ranging, dropout=0.9)
 

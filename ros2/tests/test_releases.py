@@ -185,8 +185,7 @@ def test_a_controller_switched_off_in_motion_does_not_jump_when_it_is_back():
 
 
 def test_at_rest_nothing_is_sent_and_no_motion_before_the_arm_has_settled():
-    course = Course("4.21", still, 3.0)
-    assert course.messages == 1
+    assert Course("4.21", still, 3.0).messages == 1
     early = Course("4.21", lambda t: np.full(7, 0.1), PARAMS.settle_s, wish_from=0.0)
     assert early.messages == 1
     assert np.abs(early.speed()).max() < 1e-12

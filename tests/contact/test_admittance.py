@@ -83,8 +83,7 @@ def test_a_lasting_torque_keeps_up_the_speed_of_the_damper():
 
 
 def test_a_torque_within_the_dead_band_moves_nothing():
-    state = after(mass_init(N, NO_LAG), np.linspace(-1.0, 1.0, N))
-    assert not state.velocity.any()
+    assert not after(mass_init(N, NO_LAG), np.linspace(-1.0, 1.0, N)).velocity.any()
 
 
 def test_a_torque_is_told_from_its_mean_in_free_motion():

@@ -29,8 +29,7 @@ PUSHED = (50, 10.0 * WAY, 0.3 * WAY)
 
 
 def test_a_torque_against_the_yielding_for_30_ms_is_a_clamp():
-    state = judged(PUSHED, (3, -12.0 * WAY, 0.3 * WAY))
-    assert state.torque == pytest.approx(12.0)
+    assert judged(PUSHED, (3, -12.0 * WAY, 0.3 * WAY)).torque == pytest.approx(12.0)
 
 
 @pytest.mark.parametrize(

@@ -125,8 +125,7 @@ def test_candidates_lie_on_the_capsules_and_stand_for_their_area():
     link4 = body.of_links(np.array([MODEL.link_index("panda_link4")]))
     length = np.linalg.norm(link4.b - link4.a, axis=1)
     whole = (2 * np.pi * link4.radius * (length + 2 * link4.radius)).sum()
-    found = SURFACE.area[SURFACE.link == MODEL.link_index("panda_link4")].sum()
-    assert 0.5 * whole < found < whole
+    assert 0.5 * whole < SURFACE.area[SURFACE.link == MODEL.link_index("panda_link4")].sum() < whole
 
 
 def test_the_likelihood_is_that_of_a_normal_distribution_with_the_force_integrated_out():

@@ -124,8 +124,7 @@ def test_two_units_on_one_link_count_once(panda_model, paper_skin):
 )
 def test_what_is_old_early_or_of_a_failed_sensor_is_not_believed(panda_model, paper_skin, change):
     sensors = Sensors(panda_model, touching(paper_skin, panda_model))
-    cues = sensors.cues(replace(said(7, 0), **change))
-    assert cues is None
+    assert sensors.cues(replace(said(7, 0), **change)) is None
 
 
 def test_a_sensor_that_is_stuck_is_believed_for_ten_seconds_and_comes_back_slowly(panda_model, paper_skin):

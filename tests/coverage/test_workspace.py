@@ -25,8 +25,7 @@ def test_the_hand_is_on_the_path_all_along_it(panda_model):
     hand = hands(panda_model, drawn(panda_model, "circle", 8))
     np.testing.assert_allclose(hand[:, 0], 0.5, atol=1e-5)
     np.testing.assert_allclose(np.hypot(hand[:, 1], hand[:, 2] - 0.25), 0.25, atol=1e-5)
-    turn = np.sort(np.arctan2(hand[:, 1], hand[:, 2] - 0.25))
-    assert np.diff(turn).max() < 2 * 2 * np.pi / 8
+    assert np.diff(np.sort(np.arctan2(hand[:, 1], hand[:, 2] - 0.25))).max() < 2 * 2 * np.pi / 8
     both = hands(panda_model, drawn(panda_model, "paths", 6))
     assert np.sum(np.isclose(both[:, 0], 0.4, atol=1e-5)) == 3, "half of them on the line"
     _, along = postures(panda_model, ROOM, "circle", 8, np.random.default_rng(1))

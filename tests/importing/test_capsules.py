@@ -98,5 +98,4 @@ def test_what_sticks_out_is_that_of_the_corners_of_a_box_and_covering_leaves_non
     assert covered.sticks_out < 1e-9
     assert (covered.rods[:, 6] >= found.rods[:, 6]).all()
     inside = np.random.default_rng(3).dirichlet([1, 1, 1], 500) @ box().triangles
-    rods = covering(fitted(outside), outside.on)
-    assert distance(rods, inside.reshape(-1, 3)).max() < 1e-3
+    assert distance(covering(fitted(outside), outside.on), inside.reshape(-1, 3)).max() < 1e-3

@@ -69,8 +69,7 @@ def test_a_single_finger_is_fixed_unless_asked_for(tmp_path, joint_name, link_na
 
 
 def test_a_last_link_called_gripper_is_the_arms(tmp_path):
-    found = arm(tmp_path, six_axis().replace('"link6"', '"gripper"'))
-    assert len(found.joints) == 6
+    assert len(arm(tmp_path, six_axis().replace('"link6"', '"gripper"')).joints) == 6
 
 
 def branching(before, after):

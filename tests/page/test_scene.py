@@ -81,8 +81,7 @@ def test_a_reading_that_no_obstacle_is_made_of_is_no_point_and_without_perceptio
     nodes = drawn(step)
     points, cones = nodes["/points"], nodes[CONES]
     assert len(points.points) == 0  # the arm itself, which the filter left out
-    idle = cones.batched_scales[0]
-    assert cones.batched_scales[2] == idle > 0.04
+    assert cones.batched_scales[2] == cones.batched_scales[0] > 0.04
 
     scene.show_world(replace(world, profile=PROFILES["blind"]))
     drawn(step, 0.1)

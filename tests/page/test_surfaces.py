@@ -60,8 +60,7 @@ def test_every_link_of_a_panda_has_a_surface_near_its_capsules(panda_model):
 @pytest.mark.parametrize("radius", [HandSpec.radius, 0.1])
 def test_the_fist_fills_the_simulated_ball_and_does_not_leave_it(radius):
     mesh = fist(radius)
-    reach = np.linalg.norm(mesh.vertices, axis=1)
-    assert reach.max() < 1.05 * radius
+    assert np.linalg.norm(mesh.vertices, axis=1).max() < 1.05 * radius
     around = trimesh.creation.icosphere(2).vertices
     farthest = (around @ mesh.vertices.T).max(axis=1)  # how far the fist reaches in each direction
     assert farthest.min() > 0.7 * radius

@@ -117,8 +117,7 @@ def test_a_point_that_is_none_is_left_out_and_the_others_stay(watcher, spoil):
     both = SeenPoints(
         1.0, *(np.concatenate((getattr(bad, name), getattr(one, name))) for name in ("stamp", "point", "sigma"))
     )
-    near = watcher.see(1.0, both)
-    assert near.point == pytest.approx(BESIDE[None])
+    assert watcher.see(1.0, both).point == pytest.approx(BESIDE[None])
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 300))

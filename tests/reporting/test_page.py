@@ -127,8 +127,7 @@ ODD = {
 
 @pytest.mark.parametrize("kind", ODD)
 def test_odd_recordings_make_a_page(kind, panda_model, paper_skin):
-    odd = ODD[kind](panda_model, paper_skin)
-    assert "What ran" in read(odd).said
+    assert "What ran" in read(ODD[kind](panda_model, paper_skin)).said
 
 
 def test_of_very_many_touches_those_are_listed_that_were_missed(panda_model, paper_skin):

@@ -146,8 +146,7 @@ def test_each_zone_looks_along_its_own_beam_and_the_file_keeps_the_unit_whole(pa
     np.testing.assert_allclose(across, [[-16.875, -5.625, 5.625, 16.875]] * 4)
     np.testing.assert_allclose(np.rad2deg(np.arctan2(own[:, 1], own[:, 2])).reshape(4, 4), across.T)
     # the corners' edges: near the 63 degrees from corner to corner of the data sheet
-    corner = np.rad2deg(np.arccos(own[0] @ own[15]))
-    assert 45.0 < corner < 63.0
+    assert 45.0 < np.rad2deg(np.arccos(own[0] @ own[15])) < 63.0
     turns = skin.T_link_sensor[1:, :3, :3]
     np.testing.assert_allclose(turns @ turns.transpose(0, 2, 1), np.broadcast_to(np.eye(3), (16, 3, 3)), atol=1e-12)
     save_skin(skin, tmp_path / "again.toml")

@@ -216,8 +216,7 @@ def test_a_process_that_is_killed_while_it_writes_leaves_the_old_file(tmp_path):
 def test_robots_have_files_of_their_own(tmp_path):
     names = {model_file_of(f"{kind} at {where}, hand 0.7 kg", tmp_path).path for kind in "ab" for where in ("x", "y")}
     assert len(names) == 4
-    strange = model_file_of("../../etc/passwd: a\0b", tmp_path).path
-    assert strange.parent == tmp_path / "free-motion"
+    assert model_file_of("../../etc/passwd: a\0b", tmp_path).path.parent == tmp_path / "free-motion"
 
 
 def test_the_paper_s_detector_learns_nothing_to_keep(file, panda_model, paper_skin):

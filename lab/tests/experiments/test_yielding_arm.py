@@ -55,8 +55,7 @@ def speeds(record: Record, start: float, end: float) -> np.ndarray:
 def test_an_arm_goes_with_a_hand_and_stands_when_it_is_let_go(panda_model, paper_skin):
     record, touch, release = pushed(panda_model, paper_skin, profile(SLOW), held_s=2.0, until=6.0)
     y = {round(s.stamp, 2): s.ee_position[1] for s in record.steps}
-    felt = next(s.stamp for s in record.steps if s.contact is not None)
-    assert 0 < felt - touch < 0.15
+    assert 0 < next(s.stamp for s in record.steps if s.contact is not None) - touch < 0.15
     assert speeds(record, touch, release).min() >= -0.005, "never towards the person"
     way = y[round(release, 2)] - y[round(touch, 2)]
     assert 0.24 < way < profile(SLOW).react.reach_m, "for as long as it is pushed, up to the reach of a contact"

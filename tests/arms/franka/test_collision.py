@@ -20,8 +20,7 @@ from pretouch.types import no_obstacles
 @pytest.mark.parametrize("name", PROFILES)
 def test_ours_lies_below_the_lower_and_that_below_the_upper_threshold(name: str, panda_model: RobotModel) -> None:
     behavior = collision_behavior(profile(name), panda_model)
-    ours = largest_threshold(profile(name), panda_model)
-    assert np.all(ours < behavior.lower_force[:3])
+    assert np.all(largest_threshold(profile(name), panda_model) < behavior.lower_force[:3])
     assert np.all(behavior.lower_force < behavior.upper_force)
     assert np.all(behavior.lower_torque < behavior.upper_torque)
 

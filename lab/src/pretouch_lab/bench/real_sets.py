@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from hashlib import file_digest, sha256
 from pathlib import Path
+from typing import Literal
 from zipfile import BadZipFile
 
 import numpy as np
@@ -66,8 +67,8 @@ class RealSet:
     """Pattern of its files below the folder of all sets."""
     source: str
     read: Callable[[list[Path]], list[RealRun]]
-    of_currents: bool = False
-    """True if motor currents were measured, which contain the friction of the gears."""
+    kind: Literal["tau", "current"] = "tau"
+    """Torques, or motor currents, which contain the friction of the gears."""
 
     def files(self, folder: Path) -> list[Path]:
         """Return the set's files in a folder."""
@@ -143,8 +144,8 @@ SETS = (
     RealSet(
         "rokae_yl", "xmate", "rokae_yl.npz", "YanjunLIU-ac/Dynamic_Parameter_Identification_for_Rokae_xMate", _of_arrays
     ),
-    RealSet("ur10e_contact", "ur10e", "ur10e_contact.npz", "shamilmamedov/dynamic_calibration", _of_arrays, True),
-    RealSet("ur3_joints", "ur3", "ur3_joints.npz", "PedroSaman/UR3-Modelation", _of_arrays, True),
+    RealSet("ur10e_contact", "ur10e", "ur10e_contact.npz", "shamilmamedov/dynamic_calibration", _of_arrays, "current"),
+    RealSet("ur3_joints", "ur3", "ur3_joints.npz", "PedroSaman/UR3-Modelation", _of_arrays, "current"),
     RealSet("contactInterpretation", "panda", "contactInterpretation/link*/*.csv", _GLOVE_SOURCE, _of_glove),
 )
 """All sets. None is part of this package: their repositories on GitHub state no licence, or LGPL-3."""
@@ -210,14 +211,13 @@ def _laid(times: Sequence[FloatArray]) -> FloatArray:
 
 def stream_of(real: RealSet, runs: Sequence[RealRun], model: RobotModel) -> TorqueStream:
     """Compute the external torques of all runs of a set, as `pretouch detect` does."""
-    kind, gains = ("current", (1.0,) * model.n) if real.of_currents else ("tau", ())
-    arrays = {"q": [r.q for r in runs], "dq": [r.qd for r in runs], kind: [r.torque for r in runs]}
+    arrays = {"q": [r.q for r in runs], "dq": [r.qd for r in runs], real.kind: [r.torque for r in runs]}
     joints = {name: np.concatenate(parts) for name, parts in arrays.items()}
     stamps = np.round(_laid([run.time for run in runs]) * 1e9).astype(np.int64)
     rows, sources = np.arange(len(stamps)), dict.fromkeys(joints, real.name)
     log = Log(Path(real.name), model, stamps, rows, "row {}", joints, sources).in_order(*joints)
-    r = torque_recording(log, Choice(gains=gains))
-    loaded = observed(model, r.time, r.q, r.qd, log.arrays[kind], SequentialParams().observer_gain_1_s, 1.0)
+    r = torque_recording(log, Choice(gains=(1.0,) * model.n if real.kind == "current" else ()))
+    loaded = observed(model, r.time, r.q, r.qd, log.arrays[real.kind], SequentialParams().observer_gain_1_s, 1.0)
     numbers = np.repeat(np.arange(len(runs)), [len(run.time) for run in runs])[log.rows]
     return TorqueStream(r, np.concatenate([run.label for run in runs])[log.rows], numbers, loaded - r.tau_ext)
 
