@@ -65,8 +65,8 @@ def torque_figure(d: TorqueCourse, joints: tuple[str, ...], title: str) -> Figur
             end = max(contact.end_s or 0.0, contact.time_s + 0.01)
             axes.axvspan(contact.time_s, end, color="tab:red", alpha=0.25, label=label)
         if len(d.contacts) <= 40:
-            where, names = (contact.time_s, 1.0), " or ".join(contact.links)
-            evidence.annotate(names, where, (1, 2), textcoords="offset points", rotation=90, fontsize=5)
+            where, link = (contact.time_s, 1.0), contact.link or ""  # names of several are longer than a panel is high
+            evidence.annotate(link, where, (1, 2), textcoords="offset points", rotation=90, fontsize=5)
     for axes in panels:
         axes.set_rasterization_zorder(3)  # an hour as lines would be a page of 100 MB
         axes.grid(alpha=0.3)
